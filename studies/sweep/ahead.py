@@ -19,7 +19,7 @@ LOOK_S = 0.2  # seconds between two reports of progress while a caller waits
 
 
 class Spans:
-    """Stages with the times between which they went on: those of a thread beside the run's own clock."""
+    """Stages of a thread that works beside the run's own clock, with the times at which they began and ended."""
 
     def __init__(self) -> None:
         self._spans: list[tuple[str, float, float]] = []
@@ -37,13 +37,13 @@ class Spans:
 
 
 class Ahead(Generic[Result]):
-    """A call in a thread of its own, which begins at once.
+    """Call in a thread of its own, which begins at once.
 
     Parameters
     ----------
     call : callable
-        Takes the stages that it notes its seconds in, and its progress, which raises `KeyboardInterrupt` once `stop`
-        was asked for: a render then keeps what it has and ends.
+        Function of the stages, in which it notes its seconds, and of its progress, which raises `KeyboardInterrupt`
+        after `stop`: a render then keeps what it has and ends.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Ahead(Generic[Result]):
         self.share, self._error = share, error
 
     def result(self, progress: Progress) -> tuple[Result, dict[str, float]]:
-        """Wait for the result, and give it with the seconds of each stage that were waited for.
+        """Wait for the result, and return it with the seconds of each stage that passed while waiting.
 
         Progress is called from the caller's own thread.
 

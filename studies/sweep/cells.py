@@ -40,7 +40,7 @@ class RenderRecord:
 
 
 def render_text(record: RenderRecord) -> str:
-    """Return as JSON what a row states of its render, but for what has a column of its own."""
+    """Return as JSON what a row states of its render, apart from what has a column of its own."""
     facts = asdict(record.facts)
     for column in ("variant", "seconds", "spp", "bands"):
         del facts[column]
@@ -49,7 +49,7 @@ def render_text(record: RenderRecord) -> str:
 
 @dataclass(frozen=True)
 class Cell:
-    """One picture to make. It travels to its worker as it is; arrays travel as paths.
+    """Picture to make. It travels to its worker as it is; arrays travel as paths.
 
     Attributes
     ----------

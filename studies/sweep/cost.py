@@ -51,15 +51,15 @@ class Estimate:
     Attributes
     ----------
     cells, kept, renders, workers : int
-        `kept` cells at most are in the results database from a run of this code; `renders` counts scenes, not files of
-        radiance, and of one that moves each time and the middle.
+        At most `kept` cells are in the results database from a run of this code. `renders` doesn't count files of
+        radiance; a scene that moves has one render per time and one for the middle.
     seconds : float
-        With so many workers on this machine's cores, if they are idle; first calls, imports, metrics and the report
-        are counted, and renders and cells that exist already.
+        Time with so many workers on this machine's cores, if they are idle. First calls, imports, metrics and the
+        report are counted, and so are renders and cells that exist already.
     half_size_seconds, half_cells_seconds : float
         The same at half the width and height, and with half the cells.
     bytes : float
-        Memory of all processes together, at most.
+        Most memory of all processes together.
     largest_bytes : float
         Memory of the process that needs most.
     """
@@ -75,7 +75,7 @@ class Estimate:
     largest_bytes: float
 
     def words(self) -> str:
-        """Return what is made, then time and memory, and what half of it would take."""
+        """Return what is made, then time and memory, and the time for half of it."""
         return (
             f"{self.cells} cells, at most {self.kept} kept from the last run; {self.renders} to render; about "
             f"{duration(self.seconds)} with {self.workers} workers, at most {self.bytes / 1e9:.1f} GB of memory, what "

@@ -140,7 +140,10 @@ def _check_whole(base: sqlite3.Connection, path: Path) -> None:
 
 
 def _prepare(base: sqlite3.Connection, path: Path) -> None:
-    """Check the version, or make the tables, write ahead: readers don't wait, a killed writer leaves no half."""
+    """Check the version of the tables, or make them, and turn on write-ahead logging.
+
+    With that log readers don't wait, and a writer that is killed leaves no half-written row.
+    """
     if not _has_tables(base, path):
         base.execute("BEGIN IMMEDIATE")  # so that of two sweeps only one makes the tables
         if not _has_tables(base, path):
@@ -174,7 +177,7 @@ def add(base: sqlite3.Connection, row: Row) -> None:
 
 
 def done(base: sqlite3.Connection, pictures: Path, keys: Iterable[str]) -> set[str]:
-    """Find which of these cells have an undamaged row and undamaged pictures; a power cut may have damaged either."""
+    """Return which of these cells have an undamaged row and undamaged pictures; a power cut may damage either."""
     one = f"SELECT {_COLUMNS} FROM cells WHERE key = ?"
     sound = (Row(*values[:-1]) for key in keys for values in base.execute(one, (key,)) if _is_sound(values))
     return {row.key for row in sound if is_whole(pictures / row.picture) and is_whole(pictures / row.truth)}
@@ -282,7 +285,7 @@ def forget_old(base: sqlite3.Connection) -> None:
 
 
 def note_run(base: sqlite3.Connection, started: str, host: str, study: str) -> int:
-    """Note when and where a run of a study began; returns its number."""
+    """Note when and where a run of a study began; return its number."""
     return _put(base, "runs", [started, host, study, "{}"])
 
 

@@ -42,12 +42,12 @@ class MovingLight:
     samples: int
 
     def middle(self, progress: Progress) -> tuple[Transport, tuple[str, ...]]:
-        """Render the scene at the middle of all exposures, by as many samples as all times have together."""
+        """Render the scene at the middle of all exposures, with as many samples as all times have together."""
         model = replace(self.model, spp=min(self.model.spp * len(self.opened.moving), SPP[1]))
         return make_transport(self.opened, self.study, model, self.cache, progress, samples=self.samples)
 
     def at(self, number: int, progress: Progress) -> Transport:
-        """Render the scene at one of its times by paths of their own, or read what was rendered."""
+        """Render the scene at one of its times, with paths of its own, or read that render."""
         limits = self.study.render
         seed = int(np.random.default_rng([limits.seed, _MOMENT, number]).integers(2**31))
         study = replace(self.study, render=replace(limits, seed=seed, reference=False))
@@ -66,9 +66,9 @@ class MovingLight:
         return digest(found), seconds
 
     def exposed(self, sensor: SensorConfig, exposure_s: float, middle: Transport) -> Transport:
-        """Average the light that an exposure of a sensor takes, each row by its own shares; its level is the middle's.
+        """Average the light that an exposure of a sensor takes, each row by its own shares; the level is the middle's.
 
-        Only times are read of which a row takes something.
+        Only those times are read of which some row takes a share.
         """
         opened, samples = self.opened, self.samples
         shares = centred_shares(sensor, opened.size[0], exposure_s, opened.whole_s, len(opened.moving))
@@ -83,7 +83,7 @@ class MovingLight:
 
 
 def part_of(progress: Progress, number: int, count: int) -> Progress:
-    """Return a progress for one of `count` equal parts, which is told to `progress` as a part of the whole."""
+    """Return a progress for one of `count` equal parts, which reports to `progress` as a part of the whole."""
     return lambda share, error: progress((number + share) / count, error)
 
 

@@ -100,7 +100,7 @@ def known_cells(job: Job, opened: OpenedScene) -> list[Cell] | None:
 
 
 def coloured(job: Job, opened: OpenedScene, cells: Sequence[Cell]) -> list[Cell]:
-    """Add to cells of one scene that lack them the colours of their processors under its light."""
+    """Add to those cells of a scene that lack them the colours of their processors under its light."""
     sensors = _imaged(job, opened) if cells else {}
     software = {_portable(name): software for name, software in job.software.items()}
     fits: dict[tuple[Imaged, str], ColourFit] = {}
@@ -187,7 +187,7 @@ def make_scene(job: Job, opened: OpenedScene, clock: StageClock, progress: Progr
 
 
 def note_scene(job: Job, opened: OpenedScene, record: RenderRecord) -> None:
-    """Note in the results database that a scene's files stand."""
+    """Note in the results database that the files of a scene are there."""
     note_render(job.base, _request(job, opened), record)
 
 
@@ -256,7 +256,7 @@ def _imaged(job: Job, opened: OpenedScene) -> dict[Imaged, Sensors]:
 def _make_files(
     job: Job, opened: OpenedScene, record: RenderRecord, transport: Transport, moments: MovingLight | None
 ) -> None:
-    """Make what is missing of the files that the scene's cells share; of one that moves for each exposure."""
+    """Make those files that the scene's cells share and that are missing, for a scene that moves one per exposure."""
     folder = job.out / FRAMES
     folder.mkdir(parents=True, exist_ok=True)
     samples = job.plan.samples_a_side(opened.choice)

@@ -58,7 +58,7 @@ MARKER = ".rodcone-sweep"  # file that each sweep at work locks; the lock ends w
 
 @contextmanager
 def locked_folder(out: Path) -> Iterator[None]:
-    """Make a folder that of sweeps, and hold its lock; where no other does, remove what killed ones left half written.
+    """Make a folder one of sweeps, and lock it; if no other sweep locks it, remove files that are half-written.
 
     A new or an empty folder is marked; hidden files don't count.
 
@@ -215,7 +215,7 @@ def _noted(study: Study) -> dict[str, Any]:
 def _scenes(
     job: Job, scenes: Sequence[OpenedScene], known: Sequence[list[Cell] | None], shares: "Shares", *, ahead: bool
 ) -> Generator[list[Cell], None, None]:
-    """Give the cells of each scene; with `ahead` the next scene is made meanwhile, where it isn't known."""
+    """Yield the cells of each scene; with `ahead` the next scene is made meanwhile, unless its cells are known."""
     coming: Ahead[tuple[RenderRecord, list[Cell]]] | None = None
     following = known[0]
     try:
@@ -242,18 +242,18 @@ def _scenes(
 
 
 class Shares:
-    """How far a sweep is: of each scene its render and its cells, and of the whole the mean over all scenes."""
+    """Progress of a sweep: the mean over all scenes of the shares of render and cells that are done."""
 
     def __init__(self, step: Step, count: int) -> None:
         self._step, self._count = step, count
         self.coming: Ahead[Any] | None = None  # the next scene, made beside the cells
 
     def rendered(self, index: int, share: float, error: float) -> None:
-        """Show how far the render of a scene is that is waited for."""
+        """Show the progress of a scene's render while the sweep waits for it."""
         self._show(index, render_words(error, share), RENDER_SHARE * share)
 
     def made(self, index: int, what: str, share: float) -> None:
-        """Show how far the cells of a scene are, whose render is done."""
+        """Show the progress of a scene's cells, once it is rendered."""
         rendered = 1.0 + (0.0 if self.coming is None else self.coming.share)
         self._show(index, what, RENDER_SHARE * rendered + (1 - RENDER_SHARE) * share)
 
@@ -264,7 +264,7 @@ class Shares:
 
 @contextmanager
 def noting_stages(job: Job, run: int, more: Mapping[str, float]) -> Iterator[None]:
-    """Note the seconds so far when the cells of a scene end, however they do; `more` beside those of the clock."""
+    """Note the seconds so far when the cells of a scene end, in whatever way; `more` adds to those of the clock."""
     try:
         yield
     finally:
@@ -272,7 +272,7 @@ def noting_stages(job: Job, run: int, more: Mapping[str, float]) -> Iterator[Non
 
 
 def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step) -> int:
-    """Make cells, store each as it comes with the time taken so far; returns their number."""
+    """Make cells, and store each as it comes with the time taken so far; return their number."""
     count = 0
     workers = set[tuple[str, int]]()
     seconds = defaultdict[str, float](float)

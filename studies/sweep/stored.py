@@ -20,7 +20,7 @@ from rodcone.files import inside, write_files
 
 
 def keep(folder: Path, content: bytes | memoryview, ending: str) -> str:
-    """Write a file under the digest of its content, whole or not at all; returns its name below the folder."""
+    """Write a file under the digest of its content, whole or not at all; return its name below the folder."""
     name = digest_bytes(content)
     place = folder / name[:2] / f"{name}{ending}"
     place.parent.mkdir(parents=True, exist_ok=True)
@@ -52,7 +52,7 @@ def read_array(path: Path) -> NDArray[np.floating]:
 
 
 def keep_facts(folder: Path, key: str, facts: Mapping[str, Any]) -> None:
-    """Write what goes by a key as JSON with its digest, whole or not at all."""
+    """Write facts under a key as JSON with their digest, whole or not at all."""
     write_files({folder / f"{key}.json": json.dumps({"facts": facts, "digest": digest(facts)})})
 
 

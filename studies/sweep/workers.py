@@ -167,11 +167,11 @@ def _finished(running: dict[Future[Any], Task]) -> Iterator[Any]:
 def run_in_processes(
     cells: Sequence[Task], workers: int, make: Callable[..., Any] = run_cell
 ) -> Generator[Any, None, None]:
-    """Run cells on spawned processes; a pool in which one died is made anew.
+    """Run cells on spawned processes; if one of them dies, make the pool anew.
 
-    The cells that a broken pool held are run again, after all others and one by one: where memory was short each now
-    has all of it, and the cell that ends its worker is told apart from its neighbours. Dr.Jit, BLAS and OpenMP get
-    cores / workers threads in each process.
+    The cells that a broken pool had taken are run again, after all others and one by one: if memory was short each of
+    them now has all of it, and the cell that kills its worker is told apart from the others. Dr.Jit, BLAS and OpenMP
+    get cores / workers threads in each process.
 
     Raises
     ------
@@ -199,7 +199,7 @@ def worker_processes(workers: int) -> Iterator[Callable[..., Generator[Any, None
 
 
 class _Pools:
-    """The pool at work; another takes its place once it broke."""
+    """Pool at work, which another one replaces when it breaks."""
 
     def __init__(self, stack: ExitStack, workers: int) -> None:
         self.workers = workers
@@ -266,7 +266,7 @@ def _pool(workers: int, threads: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def _end(processes: Sequence[BaseProcess]) -> None:
-    """End workers that can't leave: one killed while it held the queue's lock leaves it locked for the others."""
+    """End workers that can't end by themselves, because one that was killed has left the queue locked."""
     for process in processes:
         with suppress(ProcessLookupError):  # it has just ended
             process.kill()
