@@ -193,8 +193,6 @@ def photograph_signals(rng: np.random.Generator, light: KnownLight, name: str) -
     """Return a photograph of `PHOTOGRAPHS` at half its size as signals under the light, shape (h, w, channel).
 
     The basis has one spectrum for each colour. A random factor per channel stands for other spectra of the same colour.
-
-    The basis gives each colour one spectrum; a factor a channel stands for the others that look the same.
     """
     spectra = srgb_basis(NM)
     encoded = getattr(data, name)() / 255.0
