@@ -117,7 +117,7 @@ def share_text(share: float) -> str:
 
 @dataclass(frozen=True)
 class Plan:
-    """How a study's scenes are rendered and its pictures are made.
+    """Model of each of a study's scenes and pictures, with the error that it is predicted to add.
 
     Attributes
     ----------
