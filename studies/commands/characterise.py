@@ -26,7 +26,7 @@ FRAMES_HEAD = ("figure", "unit", "measured", "95 % from", "to")
 
 @dataclass(frozen=True, kw_only=True)
 class Frames:
-    """What is measured: raw files, or a part of a chip.
+    """Frames to measure: raw files, or a part of a simulated chip.
 
     Attributes
     ----------

@@ -51,7 +51,7 @@ def print_result(text: object, facts: Mapping[str, Any], *, json: bool) -> None:
 
 
 class Estimated(Protocol):
-    """What a command will cost."""
+    """Cost of a command before it runs."""
 
     def words(self) -> str:
         """Return the cost in one line for a reader."""

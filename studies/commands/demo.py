@@ -19,7 +19,7 @@ from studies.sweep.workers import worker_processes
 
 @dataclass(frozen=True, kw_only=True)
 class DemoOrder:
-    """What a demo photographs, and how; what is left out is as the study demo has it.
+    """Settings of a demo; those that are left out are as in the study demo.
 
     Attributes
     ----------

@@ -16,7 +16,7 @@ from studies.photograph.picture_file import check_picture_file, default_path, wr
 
 @dataclass(frozen=True, kw_only=True)
 class DevelopOrder:
-    """How raw files are developed, and into which picture.
+    """Settings by which raw files are developed into a picture.
 
     Attributes
     ----------

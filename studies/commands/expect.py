@@ -29,7 +29,7 @@ _BYTES = 0.6e9
 
 @dataclass(frozen=True)
 class _Cost:
-    """What a table of so many cameras and levels costs."""
+    """Cost of a table of so many cameras and levels."""
 
     cameras: int
     levels: int

@@ -37,7 +37,7 @@ READING = "reading the scene"  # the reading is announced because 100 000 shapes
 
 @dataclass(frozen=True, kw_only=True)
 class RenderOrder:
-    """What to render and how.
+    """Scene to render, and the settings of the render.
 
     Attributes
     ----------

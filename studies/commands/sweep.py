@@ -35,7 +35,7 @@ from studies.sweep.workers import InThisProcess, run, worker_processes
 
 @dataclass(frozen=True, kw_only=True)
 class Workers:
-    """Who makes what a study asks for.
+    """Processes or cluster that make what a study asks for.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Workers:
 
 @dataclass(frozen=True, kw_only=True)
 class SweepOrder:
-    """How a study is swept, and where to.
+    """Settings of a sweep, and the folder that it goes to.
 
     Attributes
     ----------
