@@ -26,7 +26,7 @@ RENDERS = 0.9  # share of a set's time, for the progress bar: 97 % for the froze
 
 @dataclass(frozen=True, kw_only=True)
 class SetOrder:
-    """What a set has beside its study.
+    """Settings of a data set beside its study.
 
     Attributes
     ----------

@@ -55,7 +55,7 @@ Facts = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Sample:
-    """What a sample is made from. It travels to its worker as it is; arrays travel as paths.
+    """Sample to make, with all that it is made from. It travels to its worker as it is; arrays travel as paths.
 
     Attributes
     ----------

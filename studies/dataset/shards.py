@@ -38,7 +38,7 @@ Runner = Callable[..., Generator[Any, None, None]]  # runs tasks by `make`, as `
 
 @dataclass(frozen=True)
 class Shard:
-    """A file of samples: a task of `studies.sweep.workers`.
+    """File of samples, which is a task of `studies.sweep.workers`.
 
     Attributes
     ----------
