@@ -47,7 +47,7 @@ class RenderState:
 
 @dataclass(frozen=True)
 class Source:
-    """What is explored.
+    """Scene or picture file that is explored.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Source:
 
 @dataclass(frozen=True, kw_only=True)
 class RenderOptions:
-    """How a scene is rendered.
+    """Settings of a scene's render.
 
     Attributes
     ----------
