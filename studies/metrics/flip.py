@@ -38,7 +38,7 @@ _SLOPE = 6 / 29  # below its cube CIELAB's cube root is replaced by a line
 
 @dataclass(frozen=True)
 class Seen:
-    """What FLIP needs of one picture.
+    """Picture in the form in which FLIP compares it.
 
     Attributes
     ----------

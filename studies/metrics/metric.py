@@ -7,7 +7,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Metric:
-    """A number that tells cameras apart.
+    """Number by which pictures of cameras are compared.
 
     Attributes
     ----------

@@ -17,7 +17,7 @@ C1, C2 = 0.01**2, 0.03**2  # equations 7 and 9, for values in [0, 1]
 
 @dataclass(frozen=True)
 class LocalMoments:
-    """What SSIM needs of one picture.
+    """Moments of one picture by which SSIM compares it.
 
     Attributes
     ----------
