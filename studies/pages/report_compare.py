@@ -26,7 +26,7 @@ RIVALS = (CAMERA, SENSOR, EXPOSURE, BALANCE)  # what a person chooses; scenes an
 
 @dataclass(frozen=True)
 class Axis:
-    """What varies in a study, and its values as the page writes them."""
+    """Axis of a study, and its values as the page writes them."""
 
     name: str
     values: tuple[str, ...]

@@ -40,7 +40,7 @@ class ReportSensor:
 
 @dataclass(frozen=True)
 class ReportRender:
-    """How a scene was rendered and the error that it reached; None where that isn't known.
+    """Facts of a scene's render and the error that it reached; None where they aren't known.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class ReportCell:
 
 @dataclass(frozen=True)
 class ReportData:
-    """Everything that a report shows but the pictures' bytes.
+    """Content of a report apart from the pictures' bytes.
 
     Attributes
     ----------

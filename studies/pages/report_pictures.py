@@ -24,7 +24,7 @@ LOUPE = (16, 32)  # rows and columns that the loupe shows
 
 @dataclass(frozen=True)
 class ReportPictures:
-    """What a page holds, by the names that cells and truths have for it.
+    """Pictures and maps of a page, by the names that cells and truths have for them.
 
     Attributes
     ----------
