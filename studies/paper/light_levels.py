@@ -45,7 +45,7 @@ SEEN_DELTA_E, SEEN_FLIP = 1.0, 0.05  # differences that are just seen; for FLIP 
 
 @dataclass(frozen=True)
 class LevelCurves:
-    """What a camera's pictures are over light, each (level, seed).
+    """Quality of a camera's pictures over light, and W's part in them, each (level, seed).
 
     Attributes
     ----------

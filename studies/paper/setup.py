@@ -53,7 +53,7 @@ _SPP_SHARE = {"lit_and_shadowed": 0.25, "slanted_edge": 0.25}
 
 @dataclass(frozen=True)
 class Setup:
-    """How large and how often; where renders are kept.
+    """Size and number of the figures' pictures, and the folder of the renders.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class Setup:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What the cameras look at; one of its kind, so that what follows from it is computed once.
+    """Scene that the cameras look at; compared by identity, so that what follows from it is computed once.
 
     Attributes
     ----------

@@ -33,7 +33,7 @@ DARKEST = "5ms"
 
 @dataclass(frozen=True)
 class Outcome:
-    """A camera under one reading at one exposure.
+    """Noise and quality of a camera under one reading at one exposure.
 
     Attributes
     ----------

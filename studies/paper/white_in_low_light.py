@@ -35,7 +35,7 @@ LOW_CD_M2, LOW_S = 2.5, 0.020  # low light: a tenth of Table 1's, at Figure 6's 
 
 @dataclass(frozen=True)
 class Stages:
-    """How good the three images of Figure 3 are: noise (share of white), PSNR the result gains [dB], (seed,)."""
+    """Quality of Figure 3's images: noise as a share of white, and PSNR that the result gains [dB], shape (seed,)."""
 
     colour_noise: float
     white_noise: float

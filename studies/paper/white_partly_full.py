@@ -33,7 +33,7 @@ PITCH_UM = 3
 
 @dataclass(frozen=True)
 class Bright:
-    """What Figure 5 measures under one reading.
+    """Measurements of Figure 5 under one reading.
 
     Attributes
     ----------
