@@ -89,7 +89,7 @@ _ALL_ROWS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Order:
-    """What to photograph and how.
+    """Subject to photograph, and the settings of camera, light and render.
 
     Attributes
     ----------
@@ -218,7 +218,7 @@ class Taken:
 
 @dataclass(frozen=True)
 class Checked:
-    """An order that can be carried out.
+    """Order that was checked and can be carried out.
 
     Attributes
     ----------
@@ -281,7 +281,7 @@ def carry_out(checked: Checked, step: Step | None = None) -> Taken:
 
 @dataclass(frozen=True)
 class _Subject:
-    """What is photographed.
+    """Scene or picture that is photographed.
 
     Attributes
     ----------
@@ -303,7 +303,7 @@ class _Subject:
 
 @dataclass(frozen=True)
 class _Electrons:
-    """What the chip is exposed to.
+    """Light to which the chip is exposed, in electrons.
 
     Attributes
     ----------
