@@ -11,7 +11,7 @@ ANNULUS = 0.02  # width of a step of frequency [cycles per pixel]
 
 @dataclass(frozen=True)
 class TextureResponse:
-    """What a picture holds of a chart, by frequency: (n,) each, from 0 cycles per pixel, where it is 1."""
+    """Response of a picture to a chart by frequency: arrays (n,) from 0 cycles per pixel, where the response is 1."""
 
     frequency_cycles_per_px: Floats
     mtf: Floats
