@@ -43,7 +43,7 @@ class Times:
 
 @dataclass(frozen=True)
 class Timing:
-    """One choice.
+    """Choice in a stage, with its times and its error.
 
     Attributes
     ----------

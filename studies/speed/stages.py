@@ -38,7 +38,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, kw_only=True)
 class Bench:
-    """What is measured, and how large.
+    """Scene, sensor and sizes of what is measured.
 
     Attributes
     ----------
