@@ -8,7 +8,7 @@ from render.transport import Transport
 
 @dataclass(frozen=True)
 class RenderFacts:
-    """How a render was made, as `render.transport.Transport` has it, and the error that it reached.
+    """Facts of a render, from its `render.transport.Transport`, and the error that it reached.
 
     Attributes
     ----------

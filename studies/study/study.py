@@ -121,7 +121,7 @@ class SceneChoice:
 
 @dataclass(frozen=True)
 class RenderLimits:
-    """How the scenes are rendered: the most that a plan may ask for, and the values used without a plan.
+    """Limits of the scenes' renders: the most that a plan may ask for, and the values used without a plan.
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ class RenderLimits:
 
 @dataclass(frozen=True)
 class BudgetShares:
-    """What a plan may cost in accuracy, or the starting point that is taken in place of a plan's own choice.
+    """Accuracy that a plan may give up, or the starting point that is taken in place of a plan's own choice.
 
     Attributes
     ----------
