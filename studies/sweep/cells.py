@@ -49,7 +49,7 @@ def render_text(record: RenderRecord) -> str:
 
 @dataclass(frozen=True)
 class Cell:
-    """Picture to make. It travels to its worker as it is; arrays travel as paths.
+    """Picture that is to be made. It travels to its worker as it is; arrays travel as paths.
 
     Attributes
     ----------

@@ -56,7 +56,7 @@ FELL_BACK = ("Neither LLVM nor CUDA answered: captures and the reconstruction ra
 
 @dataclass(frozen=True)
 class Job:
-    """A study being swept, its plan, the folder and the results database it goes to, and the clock of the run."""
+    """Study that is swept, with its plan, the folder and results database that it goes to, and the clock of the run."""
 
     study: Study
     plan: Plan

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Row:
-    """What the results database holds of a cell. From run to run only times and the columns of its maker differ.
+    """Content of the results database for one cell. Repeated runs change only times and the columns of their makers.
 
     Attributes
     ----------

@@ -106,7 +106,7 @@ RENDER_SHARE = 0.5  # share of the progress bar for a scene's render, whose time
 
 @dataclass(frozen=True)
 class SweepResult:
-    """What a sweep did.
+    """Outcome of a sweep.
 
     Attributes
     ----------

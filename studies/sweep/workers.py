@@ -33,7 +33,7 @@ _QUIET_TRACKER = "ignore:resource_tracker:UserWarning"
 
 
 class Task(Protocol):
-    """What a worker makes a result of: a cell of a sweep, a shard of a data set.
+    """Work whose result a worker makes: a cell of a sweep, or a shard of a data set.
 
     Tasks of one kind share what their maker prepares; the result of each has its key.
     """
