@@ -54,7 +54,7 @@ _DARKEST = 2e-3  # share of white
 
 @dataclass(frozen=True)
 class KnownLight:
-    """What channels collect from each band, over what they do from white, shape (channel, band)."""
+    """Response of the channels to each band, over their response to white, shape (channel, band)."""
 
     weights: Floats
 
