@@ -1,1 +1,1 @@
-"""Questions asked of the chain: demo sweep, metrics, report, command line."""
+"""Applications of the chain: demo, sweeps, metrics, reports and the command line."""
