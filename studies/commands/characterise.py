@@ -133,7 +133,7 @@ def characterise(
 
 
 def _measure_files(frames: Frames, out: Path | None, json: bool) -> None:
-    """Print what raw files tell, and write it as a preset."""
+    """Print the figures that are measured from raw files, and write them as a preset."""
     if out is not None:
         require_new(out, ".toml")
         check_place(out)

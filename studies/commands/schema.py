@@ -47,7 +47,7 @@ def file_schema(kind: Kind) -> dict[str, Any]:
 
 
 def sensor_schema() -> dict[str, Any]:
-    """Return the schema of a sensor file; of a pixel that is read more than once the readings hold the noise."""
+    """Return the schema of a sensor file, in which a pixel that is read more than once states its noise by reading."""
     stated = get_type_hints(SensorConfig)
     # Fields that the table leaves for the sensor to check have the types of the sensor's fields.
     levels = ("bits", "black_level_dn", "white_level_dn", "window_nm")
