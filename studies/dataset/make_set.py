@@ -1,4 +1,4 @@
-"""From a study to a set: what is asked for, whether there is room, the scenes' files, samples, shards and card."""
+"""Make a data set from a study: check the order and the room on the disk, then make files, samples, shards and card."""
 
 import re
 from collections import Counter
@@ -107,7 +107,7 @@ def _show_render(show: Step, index: int, count: int, share: float, error: float)
 
 
 def _identity(study: Study, scenes: Iterable[OpenedScene], order: SetOrder) -> str:
-    """Return the hash of all that tells a set from another: its scenes, its frames' names, and the order.
+    """Return the hash of all that distinguishes a set from another: its scenes, its frames' names, and the order.
 
     Raises
     ------
