@@ -145,7 +145,7 @@ def photograph(transport: Transport, controls: Controls, memo: Memo | None = Non
     Raises
     ------
     InputError
-        For a light group that the scene hasn't, lamps that give no light, or a value that the chain refuses.
+        For a light group that the scene doesn't have, lamps that give no light, or a value that the chain refuses.
     """
     memo = memo or Memo()
     exposed = expose_scene(transport, controls, memo)

@@ -117,7 +117,7 @@ class Controls:
     Raises
     ------
     InputError
-        For a value that isn't allowed and can be told without the scene.
+        For a value that isn't allowed, as far as that can be checked without the scene.
     """
 
     lamps: Mapping[str, Lamp] = field(default_factory=dict)

@@ -68,7 +68,7 @@ class Session:
         self._thread.start()
 
     def connect(self, send: Send) -> None:
-        """Answer another connection from now on, and tell the one before."""
+        """Answer another connection from now on, and notify the one before."""
         with self._changed:
             self._send({"kind": "taken over"}, ())
             self._send = send
@@ -264,7 +264,7 @@ class Session:
             self._begin_source(source)
 
     def _show(self, message: Header, cameras: Sequence[Controls], rendered: RenderState) -> Answer:
-        """Answer with pictures of the views that are asked for; slow processors are left for later."""
+        """Answer with pictures of the requested views; slow processors are left for later."""
         views = read_views(message["views"], len(cameras))
         with self._changed:
             sent: list[Bytes] = []

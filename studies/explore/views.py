@@ -186,8 +186,8 @@ def histogram(raw: RawImage) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``edges_e`` (n + 1,); ``counts`` by channel, (n,), what lies under the first edge or over the last in the first
-        and the last bin; ``well_e``; and ``floor_e``, the dark noise of a pixel.
+        ``edges_e`` (n + 1,), the bins' edges; ``counts`` by channel, (n,), where the first and the last bin also count
+        what lies beyond them; ``well_e``, the full well; and ``floor_e``, the dark noise of a pixel.
     """
     deepest_e = max(raw.full_well_e, *(raw.noise_of(channel).full_well_e for channel in raw.channels))
     edges = np.geomspace(LEAST_E, 1.05 * deepest_e, BINS + 1)
