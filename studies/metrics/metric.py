@@ -1,4 +1,4 @@
-"""The figures that tell pictures apart: what each says, and which difference a person sees."""
+"""Metrics by which pictures are compared: what each says, and which difference a person sees."""
 
 import tomllib
 from dataclasses import dataclass
