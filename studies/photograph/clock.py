@@ -49,7 +49,7 @@ _CALLED = set[Hashable]()  # kinds of calls that this process has made
 
 
 def timed(call: Callable[[], Result], *kind: Hashable) -> tuple[Result, float | None, float]:
-    """Make a call; the first of its kind in a process compiles kernels and loads libraries, so it is told apart.
+    """Time a call; the first of its kind in a process is timed apart, because it compiles kernels and loads libraries.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def timed(call: Callable[[], Result], *kind: Hashable) -> tuple[Result, float | 
     Returns
     -------
     result, seconds, first_s
-        Seconds of the call, None of a first one; and those of a first one, else 0.
+        Seconds of the call, None for a first one; and the seconds of a first one, else 0.
     """
     start = time.perf_counter()
     result = call()

@@ -274,7 +274,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
 
 
 def carry_out(checked: Checked, step: Step | None = None) -> Taken:
-    """Photograph what was checked, and write it; parameters and errors as of `take`."""
+    """Photograph what was checked, and write it; parameters and errors are those of `take`."""
     with kept_beside(Path(checked.order.out)) as kept:
         return _taken(checked, step, kept)
 
