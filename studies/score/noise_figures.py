@@ -180,7 +180,7 @@ def _measured_range(field: EvenField, rng: np.random.Generator) -> float:
 
 
 def _light_for_ratio(field: EvenField, ratio: float, figures: Sequence[Named]) -> Definition:
-    """Define figures of the light at which a pixel reaches a ratio, each by what it makes of the luminance."""
+    """Define figures of the light at which a pixel reaches a ratio, each as a function of the luminance."""
     luminance = electrons_at_snr(ratio, field.sensor, field.exposure_s, field.channel) / field.electrons_per_cd_m2
     reached = isfinite(luminance)
     reason = "" if reached else f"no light reaches a ratio of {ratio:g}: PRNU is in the way, or the well is full before"

@@ -32,8 +32,8 @@ class AtLight:
     accuracy, measured_accuracy : float
         Contrast transfer accuracy (`studies.score.contrast`).
     visual_noise, measured_visual_noise : float
-        Of the card beside a perfect white (`studies.score.visual_noise`); nan where a well is full, of a camera that
-        tells no colours, and in closed form where the grey's ratio is below `LEAST_RATIO`.
+        Visual noise of the card beside a perfect white (`studies.score.visual_noise`); nan where a well is full and for
+        a camera that tells no colours, and in closed form where the grey's ratio is below `LEAST_RATIO`.
     """
 
     lux: float
