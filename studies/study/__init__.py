@@ -1,1 +1,1 @@
-"""What is asked: a study, its file, its sources, its models."""
+"""Studies: their files, their scenes and their models."""

@@ -70,7 +70,7 @@ class LensTerms:
         return held_lens(replace(lens, **(terms | of_table)), self.shake)
 
     def behind(self, sensor: SensorConfig) -> SensorConfig:
-        """Return the camera behind the study's lens by data, whose f-number its exposures go by."""
+        """Return the camera behind the study's lens by data, if there is one, whose f-number counts for exposures."""
         return sensor if self.table is None else with_lens(sensor, self.table)
 
 

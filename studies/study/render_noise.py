@@ -1,4 +1,4 @@
-"""Monte Carlo noise of a render beside the sensor's own noise: its share, the line that tells it, a render without."""
+"""Monte Carlo noise of a render beside the sensor's own noise: its share, the note on it, and a render with little."""
 
 from collections.abc import Callable, Sequence
 from math import ceil, log2

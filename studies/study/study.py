@@ -234,7 +234,7 @@ class Study:
     Raises
     ------
     InputError
-        For whatever isn't allowed and can be told without opening the scenes.
+        For whatever isn't allowed, as far as that can be checked without opening the scenes.
 
     Examples
     --------
