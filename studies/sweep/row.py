@@ -37,15 +37,15 @@ class Row:
     mc_share : float
         Monte Carlo variance over the sensor's own, means over the pixels below saturation.
     snr_db : float or None
-        Green's, where the processor measures it.
+        SNR of green [dB], where the processor measures it.
     substitution : int or None
-        Whether W stood for luminance.
+        1 where W replaced the luminance, else 0; None where the processor doesn't do that.
     saturated : float
-        Share of the pixels.
+        Share of saturated pixels.
     balance_delta_e : float or None
         CIEDE2000 between a neutral grey of 18 % under the scene's light and a noise-free frame of it, developed with
-        the exposure's white balance: 0 as shot, what Gray World misses the light by else; None of a processor that
-        tells no balance.
+        the exposure's white balance: 0 as shot, and what Gray World misses the light by; None for a processor that
+        states no balance.
     balance, mean_electrons : str
         Balance and mean electrons by channel, as JSON.
     variant, readout_engine, development_engine, versions : str

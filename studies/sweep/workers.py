@@ -48,7 +48,7 @@ class Task(Protocol):
 
 
 class WorkerLostError(RuntimeError):
-    """A worker died while the executor held `cells`."""
+    """Error because a worker died while the executor had `cells`."""
 
     def __init__(self, cells: Sequence[Task]) -> None:
         super().__init__("a worker died")
