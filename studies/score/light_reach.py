@@ -35,7 +35,7 @@ def without_light(definitions: Iterable[Definition], reason: str) -> Iterator[De
 
 
 def with_reach(definition: Definition, sensor: SensorConfig, light: str) -> Definition:
-    """Add to the conditions of a light's figures where the light's table ends before the camera's window does."""
+    """State in the conditions of a light's figures where the light's table ends before the camera's window does."""
     return replace(definition, merits=tuple(_told(merit, sensor, light) for merit in definition.merits))
 
 

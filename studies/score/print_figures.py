@@ -166,8 +166,8 @@ def _white_cd_m2(field: EvenField) -> float:
 def _bits(field: EvenField) -> float:
     """Return the bits of colour: log2 of the product of the three channels' integrals of 1 / noise over the signal.
 
-    A matrix between the channels cancels in that product. With the signal s = t u^2 up to t, each integral is that of 2
-    t u / noise over u from 0 to 1.
+    A matrix between the channels cancels in that product. With the signal s = t u^2, each integral is 2 t u / noise
+    over u from 0 to 1.
     """
     return _bits_of(field, _noise_e)
 
