@@ -58,7 +58,7 @@ MARKER = ".rodcone-sweep"  # file that each sweep at work locks; the lock ends w
 
 @contextmanager
 def locked_folder(out: Path) -> Iterator[None]:
-    """Make a folder one of sweeps, and lock it; if no other sweep locks it, remove files that are half-written.
+    """Mark a folder as one of sweeps, and lock it; if no other sweep locks it, remove files that are half-written.
 
     A new or an empty folder is marked; hidden files don't count.
 
