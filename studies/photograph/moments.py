@@ -111,10 +111,10 @@ def rolling_average(transports: Iterable[Transport], shares: Floats) -> Transpor
 def time_average(transports: Iterable[Transport]) -> Transport:
     """Average the light of a scene at times that are spread evenly over an exposure.
 
-    A sensor sums light, so that the mean over k times is what it collects from a scene that stays at each of them for 1
-    / k of the exposure. An edge that moves by s pixels in the whole exposure becomes k edges s / k pixels apart: with k
-    of at least s the steps are smaller than a pixel. The renders' errors must be independent, which different seeds
-    ensure; the variance of the mean is then theirs over k.
+    A sensor sums light, so that the mean over k times is what it collects from a scene that stays at each for a k-th of
+    the exposure. An edge that moves by s pixels in the whole exposure becomes k edges s / k pixels apart: with k of at
+    least s the steps are smaller than a pixel. The renders' errors must be independent, which different seeds ensure;
+    the variance of the mean is then theirs over k.
 
     Parameters
     ----------
