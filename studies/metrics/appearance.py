@@ -40,7 +40,7 @@ def require_finite(**arrays: ArrayLike) -> None:
 
 
 def psnr_db(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
-    """Return the peak signal-to-noise ratio of values in [0, 1] [dB]; inf where they equal the truth.
+    """Return the peak signal-to-noise ratio [dB] of values in [0, 1]; inf where they equal the truth.
 
     Raises
     ------
