@@ -42,9 +42,9 @@ from sensor.shake import held_lens
 from studies.metrics.truth import GREY, Light, light_in_bands, lit_range, neutral_electrons
 from studies.study.gain import at_gain, gain_text, iso_speed
 
-LEAST_COLOUR = 1e-5  # of the signals, in the weaker of two directions: less is the rounding of a light of a line or two
-BAND_NM = 10.0  # of calibration
-GREY_COLOUR = 0.01  # of the channels' own differences, under a light that shows no colours
+LEAST_COLOUR = 1e-5  # least colour in the weaker of two directions, as a share of the signals; less is rounding
+BAND_NM = 10.0  # width of the bands of calibration [nm]
+GREY_COLOUR = 0.01  # share of the channels' differences that stays, under a light that shows no colours
 
 
 def calibrate(sensor: SensorConfig, light: Spectrum) -> ColourCalibration:
@@ -94,7 +94,7 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     behind_filters_e = electrons_per_irradiance(sensor, nm, width, 1.0, light.lamp)
     mixing = mixing_of(sensor)
     electrons = mixing @ behind_filters_e
-    response = electrons / (photons_per_joule(nm) * width)  # inside the camera's window
+    response = electrons / (photons_per_joule(nm) * width)  # 0 outside the camera's window
     names = sensor.channels
     three = list(range(min(len(names), 3)))
     collected = electrons @ light.spectrum
@@ -110,7 +110,7 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     to_srgb = fit_through_neutral(signals, colours if len(three) == 3 else grey_of(colours))
     if len(three) == 3 and not _tells_colours(signals):
         if _tells_colours(training(response[three], nm, np.ones_like(nm), surfaces, width)[0]):
-            to_srgb = _nearly_grey(collected[three])  # it is the light that shows no colours, as sodium's lines
+            to_srgb = _nearly_grey(collected[three])  # the light shows no colours, as sodium's lines don't
         else:
             three_names = ", ".join(names[:3])
             raise InputError(
@@ -127,7 +127,8 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
 
     from_srgb = rows_from_srgb(electrons, to_srgb)
     if sensor.pixel.crosstalk and len(names) > 3:
-        # Rows of the light behind each filter, mixed as the channels are: they tell what to take off W's neighbours.
+        # These rows are for the light behind each filter and are then mixed as the channels are: they say how much of
+        # W's charge to subtract from its neighbours.
         plain = (surfaces * light.spectrum) @ behind_filters_e[three].T / (behind_filters_e[three] @ light.spectrum)
         from_srgb = mixing * (behind_filters_e @ light.spectrum) / collected[:, None]
         from_srgb = from_srgb @ rows_from_srgb(behind_filters_e, fit_through_neutral(plain, colours))
@@ -135,7 +136,7 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     to_xyz = np.zeros((3, len(names)))
     to_xyz[:, three] = (
         np.linalg.inv(_srgb_of_xyz(D50_XYZ)) @ to_srgb
-    )  # D50: the connection space of DNG's ForwardMatrix
+    )  # D50 is the connection space of DNG's ForwardMatrix
     return neutral, to_srgb, neutral[:, None] * from_srgb @ from_xyz, to_xyz
 
 

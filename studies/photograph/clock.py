@@ -45,7 +45,7 @@ class Clock:
         return {**seconds, OTHER: time.perf_counter() - self._start - sum(seconds.values())}
 
 
-_CALLED = set[Hashable]()  # kinds of calls that this process has made
+_CALLED = set[Hashable]()  # kinds of calls that this process has made already
 
 
 def timed(call: Callable[[], Result], *kind: Hashable) -> tuple[Result, float | None, float]:

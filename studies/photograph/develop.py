@@ -25,8 +25,8 @@ from sensor.raw_files.raw_file import open_raw
 from studies.study.scene_source import asked_size
 from studies.study.study import AS_SHOT, WHITE_BALANCES, default_balance
 
-# Lights that the matrices under A and D65 know as well as their own temperature: the presets' neutral is met to 1 % in
-# R, G and B and 6 % in W. Under lamps with bands of their own B is up to 26 % off, and W by a factor of two.
+# Lights under which the matrices for A and D65 work as well as at these two temperatures: the presets' neutral is met
+# to 1 % in R, G and B and 6 % in W. Under lamps with emission bands B is up to 26 % off, and W by a factor of two.
 BROAD = ("A", "D50", "D55", "D65", "D75", "moonlight", "sunlight")
 
 
@@ -168,7 +168,7 @@ def develop_file(
         **file_facts,
     }
     if size != raw.shape:
-        from skimage.transform import resize_local_mean  # imported here: it takes as long as a small picture
+        from skimage.transform import resize_local_mean  # imported late: it takes as long as a small picture
 
         scaled = np.asarray(resize_local_mean(picture.rgb / raw.full_well_e, size, channel_axis=-1))
         return Developed(encode(scaled, encoding, gain=2.0**stops), facts)

@@ -8,7 +8,7 @@ from render.transport import Transport
 from rodcone.errors import InputError, require_name
 from sensor.flicker.waveform import Waveform, waveform
 
-ALL = ""  # in a light group's place: every lamp
+ALL = ""  # key that stands for every lamp, in place of a light group
 
 
 def flicker_of(texts: Sequence[str], groups: Collection[str]) -> dict[str, Waveform]:

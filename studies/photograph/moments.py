@@ -78,7 +78,7 @@ def _shares(starts_s: Floats, exposure_s: float, whole_s: float, count: int) -> 
     step_s = whole_s / count
 
     def until(time_s: Floats) -> Floats:
-        # Integral from 0 on of the tent about each time, 2 steps wide; the first and the last go on to the ends.
+        # Integral from 0 of the weight of each time, a tent 2 steps wide; at both ends the weight stays at 1.
         away = (time_s - times_s[:, None]) / step_s
         steps = np.clip(away, -1.0, 1.0)
         tent = 0.5 + steps - steps * np.abs(steps) / 2
@@ -149,12 +149,12 @@ def _average(transports: Iterable[Transport], shares: Floats | None) -> Transpor
         _require_alike(f"transports[{len(meters)}]", mean or each, each)
         meters.append(each.meter)
         mean = each if mean is None else _with(mean, each, len(meters), _parts(shares, len(meters)))
-        del each  # lets go of its light before the next is rendered
+        del each  # frees its light before the next is rendered
     if mean is None:
         raise InputError("transports: none given; allowed: one or more; give those of the times of an exposure")
     if len(meters) == 1:
         return mean
-    if shares is not None:  # a row that sees few of the times has few of the samples
+    if shares is not None:  # few of the samples count for a row that sees few of the times
         fewer = len(meters) * (shares**2).sum(axis=0)
         counts = np.rint(mean.counts / fewer[:, None]).astype(mean.counts.dtype)
         error = mean.relative_mc_error * float(np.sqrt(fewer).mean())

@@ -23,7 +23,7 @@ from studies.metrics.compare import ReferencePicture
 DATA = Path(__file__).parents[1] / "data"
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _SOFTWARE = b"Software\0rodcone"
-_RGB, _PERCEPTUAL, _UP = 2, 0, 2  # colour type, sRGB rendering intent, filter: the difference from the row above
+_RGB, _PERCEPTUAL, _UP = 2, 0, 2  # colour type RGB, sRGB's rendering intent, filter: difference from the row above
 # Primaries of P3 with D65, transfer function of sRGB, R G B as they are, full range: ITU-T H.273, tables 2 to 4.
 _P3_CODES = bytes([12, 13, 0, 1])
 
@@ -47,7 +47,7 @@ def to_png(samples: NDArray[np.unsignedinteger], encoding: str = "srgb") -> byte
 def _colour_chunks(encoding: str) -> tuple[tuple[bytes, bytes], ...]:
     if encoding == "srgb":
         return ((b"sRGB", bytes([_PERCEPTUAL])),)
-    title = ENCODINGS[encoding].title.encode("ascii") + b"\0\0"  # the name's end, and the one compression there is
+    title = ENCODINGS[encoding].title.encode("ascii") + b"\0\0"  # the end of the name, and the only compression method
     return (b"cICP", _P3_CODES), (b"iCCP", title + zlib.compress(icc_profile(encoding)))
 
 

@@ -16,8 +16,8 @@ from rodcone.errors import InputError
 from rodcone.types import Floats
 from scenes.catalogue import load
 
-BANDS = even_bands(VISIBLE_NM, 20)  # of 20 nm, as `rodcone reference` renders
-SIDE = 512  # longer side of the pictures that are shipped
+BANDS = even_bands(VISIBLE_NM, 20)  # bands of 20 nm, as `rodcone reference` renders them
+SIDE = 512  # longer side of the light that is shipped [pixels]
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def find_ready(
     """
     if any(emission_lines_nm(spectrum).size for spectrum in spectra):
         return None
-    larger = [film_size(own, SIDE)] if max(own) == OWN_SIDE else []  # a file's film states its size
+    larger = [film_size(own, SIDE)] if max(own) == OWN_SIDE else []  # the film of a file states its size
     for size in [asked] if asked else [*larger, own]:
         film = Film(size, *bands, max_depth=scene.max_depth, rr_depth=scene.rr_depth)
         if reference := ready_light(scene, film):

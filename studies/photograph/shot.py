@@ -71,15 +71,15 @@ from studies.study.scene_source import (
 )
 from studies.study.study import AS_SHOT, GRAY_WORLD, MOST_FRAMES
 
-MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly meant
-_LAMPS_IN_VIEW = 1.1  # the picture's mean luminance over the level asked for, above which a reader would wonder
+MOST_SATURATED = 0.5  # share of saturated pixels above which an exposure is probably a mistake
+_LAMPS_IN_VIEW = 1.1  # ratio of the picture's mean luminance to the level above which a note explains the difference
 _SPP = 64
-_FILE_ARRAYS = 2  # of all bands: a file's light, and its variance or what it is read from
+_FILE_ARRAYS = 2  # arrays of a file's light with all bands: the light, and its variance or its source
 _HALVES = 2  # arrays of a render's light: its mean, and half the difference of its halves
-_MOST_HELD_BYTES = 1 << 28  # of each of them; larger ones are read from files, a band at a time
-_AFTER_S = 3.5e-7  # processor seconds a pixel and band: relit light, image, exposure and what is said of its noise
-# Second part of the seed: the chip's patterns, this exposure's noise, when it starts by the lamps' clock, and the paths
-# of the light at its later times.
+_MOST_HELD_BYTES = 1 << 28  # largest of these arrays that is held; larger ones are read from files by band
+_AFTER_S = 3.5e-7  # processor seconds per pixel and band to relight, image, expose and judge the noise
+# Second part of the seed: of the chip's patterns, of the exposure's noise, of the moment in the lamps' cycle at which
+# it starts, and of the light's paths at its later times.
 _DEVICE, _FRAME, _START, _MOMENT = 0, 1, 2, 3
 _ALL_ROWS = (
     "flicker: all rows are exposed together, so that the lamps brighten or darken the whole frame; for bands state the "
@@ -332,7 +332,7 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
     balance = None if order.white_balance == AS_SHOT else illuminant(order.white_balance)
     subject = _of_file(checked, balance) if checked.opened is None else _of_scene(checked, balance, step, kept)
     colour = calibrate(checked.sensor, balance or subject.light)
-    check_place(out)  # before the render: it may take minutes
+    check_place(out)  # before the render, which may take minutes
     transport, more_notes = subject.transport()
     notes = [*subject.notes, *more_notes]
     spectra, level = subject.spectra, subject.level
@@ -341,7 +341,7 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
     if step:
         step("exposure", 0.9)
     radiance = relight_by_band(transport, spectra, **level)
-    transport = light_alone(transport)  # the relit light knows its error
+    transport = light_alone(transport)  # the relit light has its own error
     luminance_cd_m2 = radiance.mean_luminance
     if luminance_cd_m2 > _LAMPS_IN_VIEW * level.get("luminance_cd_m2", luminance_cd_m2):
         notes += [
@@ -354,7 +354,7 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
     sensor, exposure_s = lit.sensor, lit.exposure_s
     lamps = lamp_parts(transport, spectra, level, checked.flicker)
     whole = radiance.whole() if lamps else None
-    del subject, transport, radiance  # all bands of the light, which nothing needs from here on
+    del subject, transport, radiance  # free all bands of the light, which nothing needs from here on
     taken = _frames(checked, lit, whole, lamps)
     notes += [_ALL_ROWS] * bool(lamps and sensor.row_time_us == 0)
     del whole, lamps
@@ -398,7 +398,7 @@ def _of_file(checked: Checked, balance: Spectrum | None) -> _Subject:
     light_name = order.light[0] if order.light else None
     light_of_file = light_name or (None if balance is None or is_reflectance(order.source) else order.white_balance)
     white = file_white(order.source, light_of_file)
-    white = white if light_name else replace(white, named=False)  # a white balance names no lamp
+    white = white if light_name else replace(white, named=False)  # because a white balance doesn't name a lamp
     transport, notes = open_radiance_file(order.source, white)
     light = white.spectrum
     if is_reference(order.source):
@@ -449,8 +449,8 @@ def _electrons(
     exposure_s, sensor = _exposure(checked, per_second_e)
     if checked.opened is None:
         return _Electrons(per_second_e, None, None, exposure_s, sensor)
-    # The render's error is half the difference of its halves: how far one lies from their mean, the frame. Beside a
-    # lamp a lens that is sampled once a pixel undershoots; a frame has no light there (`form_image`).
+    # The render's error is half the difference of its halves, because the frame is their mean. Beside a lamp a lens
+    # that is sampled once per pixel undershoots below 0, where `form_image` gives no light.
     expected_e = _mosaic(per_second_e, sensor) * exposure_s
     even_e = _mosaic(imaged_electrons(halves()[0], sensor, exposure_s, samples), sensor)
     error_e = np.where(expected_e > 0, even_e - expected_e, 0.0)
@@ -470,7 +470,7 @@ def _frames(
     rng = np.random.default_rng([seed, _FRAME])
     if radiance is None:
         channels_e = lit.per_second_e
-        channels_e *= exposure_s  # in place: nothing needs them again
+        channels_e *= exposure_s  # in place, because nothing needs the old values
         return [expose_channels(channels_e, sensor, exposure_s, device, rng) for _ in range(frames)]
     image = form_image(radiance, sensor, checked.samples)
     imaged = [(lamp, image if part is None else form_image(part, sensor, checked.samples)) for lamp, part in parts]
@@ -614,7 +614,7 @@ def check(order: Order) -> Checked:
     asked_level(opened.scene, order.level)
     spectra = asked_spectra(opened.scene, order.light)
     flicker = flicker_of(order.flicker, opened.scene.groups)
-    # A scene that measures sharpness takes samples within a pixel, which light that is there already hasn't.
+    # A scene that measures sharpness takes several samples along a pixel's side, which stored light doesn't have.
     samples = samples_a_side(str(order.source), [sensor])
     ready = _ready(order, opened, spectra) if samples == 1 and order.focus_m is None and not moving else None
     size = ready.size if ready else _size(order, opened)

@@ -56,11 +56,11 @@ def snr(electrons: Floats, sensor: SensorConfig, exposure_s: float, channel: str
     >>> rodcone.snr(np.array([100.0, 10_000.0]), rodcone.low_noise(), 0.01).round(1)
     array([ 9.8, 70.7])
     """
-    at_channel(chip_readings(sensor, exposure_s), channel)  # which asks for one
+    at_channel(chip_readings(sensor, exposure_s), channel)  # raises an error if a channel has to be named
     if channel is not None:
         require_name("channel", channel, sensor.channels)
     even = replace(sensor, pixel=replace(sensor.pixel, crosstalk=0.0))
-    # each is a frame of its own, for which a camera may switch its gain or meter a channel
+    # Each number of electrons is a frame of its own, for which a camera may switch its gain or meter a channel.
     chosen = sensor.chip.switched or any(x.metered for x in sensor.chip.channels)
     fields = electrons.ravel()[:, None] if chosen else electrons[None]
     moments = [frame_moments(field, resolve(even, field, exposure_s, channel)) for field in fields]
@@ -102,7 +102,7 @@ def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s
     ratios = {}
     for name, e in electrons.items():
         full_e = max(x.headroom_e for x in at_channel(chip_readings(sensor, exposure_s), name))
-        metered = any(x.metered for x in sensor.chip.channels if x.channel == name)  # in time, before the well is full
+        metered = any(x.metered for x in sensor.chip.channels if x.channel == name)  # it stays below the full well
         ratios[name] = np.where(metered | (e < full_e), snr(e, sensor, exposure_s, name), np.nan)
     return ratios
 
