@@ -7,11 +7,12 @@ reaches the corners of a picture of 6 mm diagonal, and focused where the rays of
 together. A ray that crosses the pupil at p, in units of its rim, misses the point's place by -2 N dW/dp: of this the
 coefficients of the wave's path W are the least squares. The pupil's half axes are those of the rays' directions behind
 the lens, and the relative illumination is its area, because an even wall gives each direction the same light. Light
-that a mount cuts off isn't known from a prescription and is left in; double_gauss states its vignetting.
+that a mount cuts off isn't known from a prescription and is left in; double_gauss states its vignetting. A lens that is
+stopped down passes the middle of its pupil alone, of which the mount cuts less, and is focused anew.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +50,7 @@ class Prescription:
 
 INF = float("inf")
 CROWN, FLINT = (AbbeMaterial(n, v, model="buchdahl") for n, v in ((1.617, 55.0), (1.649, 33.8)))
-LENSES = (
+TRIPLET, GAUSS = (
     Prescription(
         "cooke_triplet",
         "Triplet f/2.7 of K. Pestrecov, field of 28.6 degrees",
@@ -91,6 +92,21 @@ LENSES = (
         (0.0, 0.0, 0.05, 0.12, 0.2, 0.3, 0.4),
     ),
 )
+
+
+def stopped_down(lens: Prescription, f_number: float) -> Prescription:
+    """Return a lens whose stop is closed: of a pupil smaller by a ratio the mount cuts what lies beyond that ratio."""
+    ratio = f_number / lens.f_number
+    return replace(
+        lens,
+        name=f"{lens.name}_f{f_number:g}",
+        title=lens.title.replace(f"f/{lens.f_number:g}", f"f/{lens.f_number:g}, stopped down to f/{f_number:g}"),
+        f_number=f_number,
+        cut=[max(1 - (1 - cut) * ratio, 0.0) for cut in lens.cut],
+    )
+
+
+LENSES = (TRIPLET, GAUSS, stopped_down(GAUSS, 4.0))
 
 
 def optic_of(lens: Prescription) -> Optic:

@@ -289,12 +289,12 @@ def test_bad_tables_are_refused_in_one_line(write, tmp_path):
 
 
 def test_shipped_lenses_are_whole_and_a_sensor_file_finds_its_lens_beside_it(write, tmp_path):
-    assert shipped() == ("cooke_triplet", "double_gauss")
+    assert shipped() == ("cooke_triplet", "double_gauss", "double_gauss_f4")
     for name in shipped():
         table = lens_table(with_lens(low_noise(), name).lens)
         seen = [float(np.abs(transfer(table, height, 550.0, 0.05, 0.0))) for height in (0.0, 0.5, 1.0)]
         assert 0.1 < min(seen) <= max(seen) < 0.9
-        assert table.relative_illumination[-1] < 0.9
+        assert (table.relative_illumination[-1] < 0.9) == (name != "double_gauss_f4")
     path = tmp_path / "camera.toml"
     write("mine")
     given = (Path(sensor_package.__file__).parent / "data" / "low_noise.toml").read_text()
@@ -305,6 +305,31 @@ def test_shipped_lenses_are_whole_and_a_sensor_file_finds_its_lens_beside_it(wri
     assert sensor.lens.table == str(tmp_path / "mine.toml")
     path.write_text(own + "f_number = 2.8\n")
     refusal(read_sensor, path, match="camera.toml.*: f_number: 2.8 with the lens .*allowed: 4")
+
+
+def test_a_lens_stopped_down_passes_the_middle_of_the_wave_that_it_passes_wide_open():
+    """On the axis both waves differ by one focus for all wavelengths: of a shift z, z (1 - cos) of each ray's angle.
+
+    Wide open the terms leave 0.008 um of the rays' places unexplained: 1 nm over the sine of 1/8 that f/4 passes.
+    """
+    wide, narrow = (read_lens(name) for name in ("double_gauss", "double_gauss_f4"))
+    sines = np.linspace(0.0, 0.99 / 8, 40)
+    shifts_um = []
+    for nm in wide.wavelength_nm:
+        paths_nm = []
+        for table in (wide, narrow):
+            coefficients, (half, _) = table.wavefront_nm(0.0, nm)
+            place = sines * 2 * table.f_number / half
+            terms = [zernike(j, place, np.zeros_like(place)) for j in table.point_spread.noll]
+            paths_nm.append(coefficients @ np.array(terms))
+        basis = np.stack([np.ones_like(sines), 1e3 * (1 - np.sqrt(1 - sines**2))], axis=1)
+        apart_nm = paths_nm[0] - paths_nm[1]
+        fitted, *_ = np.linalg.lstsq(basis, apart_nm, rcond=None)
+        np.testing.assert_allclose(basis @ fitted, apart_nm, rtol=0, atol=1.0)
+        shifts_um.append(fitted[1])
+    assert abs(np.mean(shifts_um)) > 5
+    assert np.ptp(shifts_um) < 2 * 0.008 * 8
+    assert wide.relative_illumination[-1] < 0.6 < 0.9 < narrow.relative_illumination[-1]
 
 
 def test_files_that_change_under_a_camera_are_refused_and_their_hash_goes_with_the_table(write, tmp_path):
