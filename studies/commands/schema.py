@@ -47,7 +47,10 @@ def file_schema(kind: Kind) -> dict[str, Any]:
 
 
 def sensor_schema() -> dict[str, Any]:
-    """Return the schema of a sensor file, in which a pixel that is read more than once states its noise by reading."""
+    """Return the schema of a sensor file.
+
+    Of a pixel that is read more than once the readings hold the noise, and a lens by data holds its f-number.
+    """
     stated = get_type_hints(SensorConfig)
     # Fields that the table leaves for the sensor to check have the types of the sensor's fields.
     levels = ("bits", "black_level_dn", "white_level_dn", "window_nm")
@@ -65,6 +68,9 @@ def sensor_schema() -> dict[str, Any]:
     of_readings = [name for name in pixel["required"] if name in ("read_noise_e", "dsnu_e", "full_well_e")]
     pixel["required"] = [name for name in pixel["required"] if name not in of_readings]
     table["anyOf"] = [{"required": ["readings"]}, {"properties": {"pixel": {"required": of_readings}}}]
+    lens = table["properties"]["lens"]
+    by_data = {"required": ["table"], "properties": {"table": {"minLength": 1}}}
+    lens["anyOf"] = [{"required": lens.pop("required")}, by_data]
     return table
 
 

@@ -30,6 +30,7 @@ WRONG_SENSORS = [
     (("readout",), "both"),
     (("bits",), 12.5),
     (("lens",), None),
+    (("lens", "f_number"), None),  # and no table
 ]
 WRONG_STUDIES = [
     (("level",), "1lux"),
