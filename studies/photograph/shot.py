@@ -51,7 +51,7 @@ from studies.photograph.camera import calibrate, with_notes
 from studies.photograph.lamps import flicker_of, lamp_parts
 from studies.photograph.moments import rolling_average, rolling_moments, time_average
 from studies.photograph.ready_light import Ready, find_ready
-from studies.study.cost import TABLE_S, PictureCost
+from studies.study.cost import TABLE_BAND_S, TABLE_S, PictureCost
 from studies.study.focus import in_focus
 from studies.study.gain import at_gain, gain_text
 from studies.study.levels import parse_exposure, parse_level
@@ -607,7 +607,8 @@ def check(order: Order) -> Checked:
         check_radiance_file(order.source, () if order.level is None else (order.level,))
         pixels, bands, groups = extent_of(order.source)
         arrays = _light_arrays(order, sensor, 0 if comes_by_band(order.source) else _FILE_ARRAYS)
-        cost = PictureCost((1, pixels), bands, groups, 0, _after_s(sensor), light_arrays=arrays)
+        after_s, band_s = _after_s(sensor)
+        cost = PictureCost((1, pixels), bands, groups, 0, after_s, light_arrays=arrays, band_s=band_s)
         return Checked(order, sensor, None, exposure_s, None, 1, cost, flicker_of(order.flicker, ()))
     # A scene, rendered or there already.
     opened, moving, shares = _opened(order, exposure_s, sensor)
@@ -629,15 +630,17 @@ def check(order: Order) -> Checked:
     spp = 0 if ready else order.spp or _SPP
     times = max(len(moving), 1)
     rendered = (samples * size[0], samples * size[1])
+    after_s, band_s = _after_s(sensor)
     cost = PictureCost(
         rendered,
         centres.size,
         len(opened.scene.groups),
         spp,
-        _after_s(sensor),
+        after_s,
         through=through,
         times=times,
         light_arrays=_light_arrays(order, sensor, _held(prod(rendered), centres.size, len(opened.scene.groups))),
+        band_s=band_s,
     )
     return Checked(order, sensor, opened, exposure_s, ready, samples, cost, flicker, moving, shares)
 
@@ -661,9 +664,10 @@ def _light_arrays(order: Order, sensor: SensorConfig, held: int) -> int | None:
     return held if spreads(sensor.lens) and not order.flicker else None
 
 
-def _after_s(sensor: SensorConfig) -> float:
-    """Return the processor time of what follows the light [s per pixel and band]."""
-    return _AFTER_S + TABLE_S * bool(sensor.lens.table)
+def _after_s(sensor: SensorConfig) -> tuple[float, float]:
+    """Processor seconds of what follows the light: per pixel and band, and per band."""
+    by_data = bool(sensor.lens.table)
+    return _AFTER_S + TABLE_S * by_data, TABLE_BAND_S * by_data
 
 
 def _opened(

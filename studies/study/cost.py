@@ -29,8 +29,8 @@ _WORK_S = 8.8e-3
 # Time that a render of the same scene at another moment adds: for loading and tracing it anew, and for storing and
 # averaging its light, per pixel, band and light group.
 _ANOTHER_S = 0.8, 1.2e-7
-# An exposure behind a lens by data, which has different images at different places: per pixel and band, by 512 px.
-TABLE_S = 1.6e-6
+# Of an exposure behind a lens by data: a band's images of points, however many pixels, and a pixel and band's spread.
+TABLE_BAND_S, TABLE_S = 0.5, 2.5e-7
 KERNELS = Path.home() / ".drjit"
 
 
@@ -57,7 +57,9 @@ class PictureCost:
     times : int
         Number of renders whose mean is taken, each with so many samples, for a scene that moves.
     light_arrays : int, optional
-        Arrays of the light where its bands are made one at a time, as in `rodcone.memory.memory`.
+        Of what makes the light's bands one at a time, as `rodcone.memory.memory` takes it.
+    band_s : float
+        Processor seconds per band of what follows the light and doesn't grow with the pixels.
     """
 
     size: tuple[int, int]
@@ -70,6 +72,7 @@ class PictureCost:
     through: str = ""
     times: int = 1
     light_arrays: int | None = None
+    band_s: float = 0.0
 
     @property
     def pixels(self) -> int:
@@ -102,7 +105,8 @@ class PictureCost:
         another = another_s(self.pixels, self.bands, self.groups)
         render = self.times * min(render, self.max_seconds or render) + (self.times - 1) * pace() * another
         compiled = _COMPILE_S * self.bands if spp and not kernels_kept() else 0.0
-        return pace() * (START_S + compiled + self.after_s * self.pixels * self.bands) + render
+        after = (self.after_s * self.pixels + self.band_s) * self.bands
+        return pace() * (START_S + compiled + after) + render
 
     def facts(self) -> dict[str, Any]:
         """Return the values that ``--dry-run --json`` prints."""

@@ -15,7 +15,7 @@ from rodcone.progress import duration
 from sensor.presets import preset
 from studies.budget.ledger import Plan
 from studies.budget.starting_points import plan_from_settings, reference_plan
-from studies.study.cost import START_S, TABLE_S, another_s, averaged_s, cores, pace, render_seconds
+from studies.study.cost import START_S, TABLE_BAND_S, TABLE_S, another_s, averaged_s, cores, pace, render_seconds
 from studies.study.equal_area import sensor_shapes
 from studies.study.lit_scene import OpenedScene, film_of, open_all
 from studies.study.study import REFERENCE, SceneChoice, Study, conditions, study_mosaics
@@ -233,6 +233,7 @@ def _seconds(
         each = least_s + (pixel_s + sum(costs[0] for costs in own) / len(own)) * of_sensor
         at_once = max(1, min(workers, cores()))
         seconds += pixels * part.bands * (shared_s * images * exposed + _READ_S * (part.spp == 0))
+        seconds += part.bands * TABLE_BAND_S * behind_tables  # whose images of points all mosaics share
         seconds += cells / len(parts) * each / at_once
         seconds += planned * (_PILOT_S if part.spp else _PICTURE_PILOT_S)
     seconds += picture_s * min(cells, SHOWN) + row_s * max(cells - SHOWN, 0.0)

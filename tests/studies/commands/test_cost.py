@@ -22,6 +22,7 @@ from studies.pages.report_sweep import MOST_CELLS
 from studies.photograph import shot
 from studies.study import cost
 from studies.study.cost import START_S, PictureCost, pace, render_seconds
+from studies.study.model import LensTerms
 from studies.study.study import BudgetShares, RenderLimits, SceneChoice, Study
 from studies.study.study_file import read_study
 from studies.sweep import cost as sweep_cost
@@ -173,6 +174,19 @@ def test_each_mosaic_has_an_image_of_its_own(tmp_path: Path) -> None:
     )
     pixels, bands, _ = extent_of(tmp_path / "scene.exr")
     assert two - one == pytest.approx(7e-7 * pixels * bands, rel=1e-6)
+
+
+def test_a_lens_by_data_costs_its_images_of_points_however_small_the_picture(tmp_path: Path) -> None:
+    """By hand: half a second a band, once for all mosaics of a sensor, and 2.5e-7 s a pixel and band of each image."""
+    plain, behind = (shot.check(shot.Order("still_life", size=64, lens=lens)).cost for lens in (None, "double_gauss"))
+    assert behind.seconds - plain.seconds == pytest.approx(plain.bands * (0.5 + 2.5e-7 * 64**2), rel=1e-9)
+    study = SAMPLE.small_study(tmp_path, processors=("bayer", "mono"))
+    pixels, bands, _ = extent_of(tmp_path / "scene.exr")
+    one, two = (
+        estimated(replace(study, lens=LensTerms(table=lens)), tmp_path / "out", 1).seconds
+        for lens in (None, "double_gauss")
+    )
+    assert two - one == pytest.approx(bands * (0.5 + 2 * 2.5e-7 * pixels), rel=1e-6)
 
 
 def test_a_sweeps_line_tells_each_size_in_its_place_and_unit() -> None:
