@@ -19,7 +19,8 @@ def study(name: str = "light_levels", /, *, out: Path | None = None) -> None:
         that look alike under D65), infrared_cut (a filter in or out), responses (broad filters or narrow ones),
         exposures (exposure times and fixed patterns on Table 1's pixel), isos (speeds of a phone's pixel), flicker
         (exposure times under lamps of 100 Hz), motion (exposure times of a walker by night), glare (a street's lamps
-        through a lens that scatters), opponents (every processor), white_pixel (one method with and without W),
+        through a lens that scatters), lens (a lens by data wide open and stopped down), depth_of_field (f-numbers of a
+        lens that is focused elsewhere), opponents (every processor), white_pixel (one method with and without W),
         white_pixel_lights (the same under four lights), real_cameras (five cameras that exist beside the paper's
         pixel), eye (rods and cones, interleaved and in blocks), benchmark (the frozen list of rodcone judge), demo
         (what rodcone demo makes), or paper_1b and paper_6 (of the paper's figures).

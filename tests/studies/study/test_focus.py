@@ -12,13 +12,13 @@ from render.geometry import camera, thin_lens
 from render.scene import LightGroup, Scene
 from render.spectrum import flat
 from sensor.lens.focus import circle_of_confusion_um, focal_length_of_view_mm, pupil_mm
-from sensor.presets import low_noise
+from sensor.presets import low_noise, preset
 from studies.photograph.shot import Order, check
 from studies.study.focus import in_focus
 from studies.study.lit_scene import open_all
 from studies.study.model import LensTerms
 from studies.study.study import SceneChoice, Study
-from studies.study.study_file import read_study
+from studies.study.study_file import EXAMPLES, read_study
 
 SIDE, VIEW_DEG, RADIUS_M = 48, 8.0, 1e-3
 
@@ -107,6 +107,16 @@ def test_a_study_s_scene_is_rendered_through_its_sensors_one_lens(tmp_path):
     wrong(SceneChoice("still_life", focus_m=2.0), sensors=("low_noise", "table1_output_6um"))
     wrong(SceneChoice("still_life", focus_m=2.0), sensor_side_um=500.0)
     refusal(SceneChoice, "still_life", focal_length_mm=50.0, match="focal_length_mm: 50 without a distance of focus")
+
+
+def test_the_example_s_sensors_state_the_discs_of_one_lens_at_its_f_numbers():
+    study = read_study(EXAMPLES / "depth_of_field.toml")
+    lenses = [preset(name).lens for name in study.sensors]
+    assert [lens.f_number for lens in lenses] == [1.4, 2.8, 5.6]
+    for lens in lenses:
+        disc_um = circle_of_confusion_um(lens.f_number, 12.0, 1.0, 1.1)
+        assert lens.defocus_um == pytest.approx(disc_um, abs=0.005)  # of two digits
+    assert {preset(name).pixel for name in study.sensors} == {low_noise().pixel}
 
 
 def test_the_first_line_tells_the_lens_and_light_that_is_there_is_left_aside():
