@@ -18,9 +18,8 @@ from sensor.flicker.waveform import Waveform
 
 
 def check_flicker(sensor: SensorConfig, held: bool = False) -> None:
-    """Raise `InputError` for a camera for which flicker isn't modelled; `held` allows one that shakes."""
-    times = [x.time_share for x in sensor.chip.readings] + [x.time_share for x in sensor.chip.channels]
-    if min(times, default=1.0) < 1 or any(x.metered for x in sensor.chip.channels):
+    """Raise `InputError` for a camera that lamps which flicker aren't modelled for; `held` allows one that shakes."""
+    if reads_parts(sensor):
         raise InputError(
             "flicker: the camera reads some charge after a part of the time, which sees another part of the lamp's "
             "period; allowed: readings of the whole time; leave flicker out, or give every reading the whole time"
@@ -30,6 +29,12 @@ def check_flicker(sensor: SensorConfig, held: bool = False) -> None:
             f"flicker: with shake_um {sensor.lens.shake_um:g}, whose blur follows the lamp's light; allowed here: 0; "
             "leave one of them out, or take single pictures by rodcone capture"
         )
+
+
+def reads_parts(sensor: SensorConfig) -> bool:
+    """Return whether a camera reads some charge after a part of the exposure."""
+    times = [x.time_share for x in sensor.chip.readings] + [x.time_share for x in sensor.chip.channels]
+    return min(times, default=1.0) < 1 or any(x.metered for x in sensor.chip.channels)
 
 
 def row_weights(waveform: Waveform, sensor: SensorConfig, rows: int, exposure_s: float, start_s: float = 0.0) -> Floats:

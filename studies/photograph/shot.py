@@ -57,7 +57,7 @@ from studies.study.gain import at_gain, gain_text
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra, under
 from studies.study.model import samples_a_side
-from studies.study.motion import moments_s
+from studies.study.motion import check_moving, longest_span_s, moments_s
 from studies.study.render_noise import monte_carlo_share, noise_note, speckle_sizes
 from studies.study.scene_source import (
     LIGHT,
@@ -620,6 +620,9 @@ def check(order: Order) -> Checked:
     ready = _ready(order, opened, spectra) if samples == 1 and order.focus_m is None and not moving else None
     size = ready.size if ready else _size(order, opened)
     check_frame(sensor, size)
+    if moving and exposure_s is not None:
+        whole_s = longest_span_s([sensor], size[0], [exposure_s])
+        check_moving(sensor, flicker.values(), whole_s, len(moving))
     through = ""
     if order.focus_m is not None:
         lens = order.focus_m, order.focal_length_mm

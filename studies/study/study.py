@@ -35,6 +35,7 @@ from studies.study.equal_area import EqualArea
 from studies.study.gain import at_gain, gain_text
 from studies.study.levels import check_known, check_rendered_range, parse_exposure, parse_level
 from studies.study.model import LensTerms
+from studies.study.motion import check_moving
 
 OWN = "own"  # stands for the spectra of the scene's own lights
 MOST_FRAMES = 64
@@ -447,3 +448,9 @@ def _check_moments(study: Study) -> None:
             "sensor_side_um": study.sensor_side_um if rolls else None,  # its rows aren't the render's
         },
     )
+    longest_s = max(parse_exposure(exposure) or 0.0 for exposure in study.exposures)
+    lamps = [waveform(study.flicker)] if study.flicker else []
+    for name in study.sensors:
+        with in_place(f"sensor {label(name)}"):
+            for scene in moving:
+                check_moving(preset(name), lamps, longest_s, scene.moments or 1)

@@ -85,6 +85,28 @@ def test_what_does_not_move_or_has_no_time_is_refused(scene_file: Path) -> None:
     refusal(open_scene, "walker", time_s=1e3, match="time_s: 1000")
 
 
+def test_what_counts_other_than_by_time_is_refused_beside_motion() -> None:
+    """A cosine of depth 0.284 at 100 Hz swings by 0.284 |sinc(1/4)| in 2.5 ms, and by 0 in the 20 ms of two periods."""
+    swing = 100 * 0.284 * np.sin(np.pi / 4) / (np.pi / 4)
+    lamp = Order("walker", exposure="10ms", moments=4, size=32, flicker=("fluorescent@100Hz",))
+    refusal(
+        check, lamp, match=f"flicker: beside moments = 4.*2.5 ms.*100 Hz swings by {swing:.0f}%;.*exposure of 40 ms"
+    )
+    for steady in (
+        replace(lamp, exposure="80ms"),
+        replace(lamp, exposure="89ms"),
+        replace(lamp, moments=1),
+        replace(lamp, exposure="10ms", row_time="2258.0645us"),  # 31 of them are 70 ms
+        replace(lamp, exposure="0s"),
+    ):
+        assert len(check(steady).moving) == steady.moments
+    for sensor in ("staggered", "white_apart"):
+        parts = Order("walker", exposure="100ms", moments=4, size=32, sensor=sensor)
+        refusal(check, parts, match="moments: the camera reads some charge after a part of the time")
+        assert check(replace(parts, moments=None)).moving == ()
+    assert check(Order("walker", exposure="100ms", moments=4, size=32, sensor="split_pixel")).moving
+
+
 @pytest.mark.thorough
 def test_a_photograph_of_a_scene_file_that_moves_is_blurred(scene_file: Path, tmp_path: Path) -> None:
     """The ball's shadow side is spread over its way: fewer pixels are as dark as those of the ball that stands."""

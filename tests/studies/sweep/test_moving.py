@@ -178,6 +178,9 @@ def test_what_a_study_of_motion_can_not_say_is_refused(tmp_path: Path) -> None:
     for name, value in {"noise_share": 0.03, "max_seconds": 1.0, "denoise": True}.items():
         words = name.replace("_", "-")
         refused(f"render.{words}: {value} beside scene", render=replace(RenderLimits(), **{name: value}))
+    refused("sensor staggered: moments: the camera reads some charge after a part", sensors=("low_noise", "staggered"))
+    refused("sensor low_noise: flicker: beside moments = 4.* 5 Hz swings by 100%", flicker="pwm@5Hz:0.5")
+    study_of(tmp_path, flicker="metal_halide@100Hz")  # the longest exposure's quarter is ten periods
     (tmp_path / "scene.exr").touch()
     picture = study_of(tmp_path, scenes=(SceneChoice(str(tmp_path / "scene.exr"), moments=2),))
     refusal(open_all, picture, match="moments: 2 for .*scene.exr, a picture without surfaces")
