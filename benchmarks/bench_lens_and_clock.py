@@ -27,7 +27,7 @@ from render.scene import LightGroup
 from render.transport import Transport
 from sensor.flicker.rows import flickering
 from sensor.flicker.waveform import waveform
-from sensor.lens.table import with_lens
+from sensor.lens.table import shipped, with_lens
 from sensor.optics import form_image
 from sensor.presets import low_noise
 from sensor.shake import held_lens, shaken
@@ -110,7 +110,7 @@ def cases(side: int) -> dict[str, tuple[str, Callable[[], Callable[[], object]]]
             f"the mean of {TIMES} times, rows that roll",
             averaged(rolling_moments(rolling, side, EXPOSURE_S, TIMES)[1]),
         ),
-        "table": ("a lens by data, `cooke_triplet`", imaged(with_lens(sensor, "cooke_triplet"))),
+        **{lens: (f"a lens by data, `{lens}`", imaged(with_lens(sensor, lens))) for lens in shipped()},
     }
 
 
