@@ -9,8 +9,11 @@ import scipy
 from refusal import refusal
 
 from render.engine import render
+from render.geometry import camera, look_at
 from render.radiance import SpectralRadiance
 from scenes.catalogue import load
+from scenes.materials import disk, matte, under_sky
+from scenes.reflectances import grey
 from sensor.config import LensConfig
 from sensor.lens.scatter import scattered_share, scatters, veil_per_sr
 from sensor.optics import camera_equation, form_image, left_out
@@ -102,6 +105,30 @@ def test_veiling_glare_index_of_a_black_patch():
     even = image(picture, replace(lens, veiling_glare=0.01), view_deg)
     share = even[160, 160] - 0.99 * index
     assert share == pytest.approx(0.01 * image(picture, lens, view_deg).mean(), rel=1e-9)
+
+
+def test_veiling_glare_index_of_a_rendered_chart():
+    """ISO 9358: a black patch of 5 degrees before a bright field, as a camera of 40 degrees renders both.
+
+    By hand the veil is the wings' integral over the square that the camera sees, less the patch.
+    """
+    lens, side, view_deg = LENSES["slope 2"], 81, 40.0
+    edge, half = tan(radians(2.5)), tan(radians(view_deg / 2))
+    patch = {"patch": disk(look_at((0, 0, 0), (0, 0, 1)), edge, matte(grey(0.0)))}
+    chart = under_sky("chart", camera(view_deg, (0, 0, 1), (0, 0, 0)), patch, "D65", "patch")
+    light = render(chart, (side, side), wavelength_nm=NM, spp=16).relight()
+    assert light.values[0, 0, 1] > 0 == light.values[side // 2, side // 2, 1]
+    seen = form_image(light, replace(low_noise(), lens=lens)).values[..., 1] / camera_equation(lens)
+
+    def around(r):
+        """Arc of a circle of this radius within the square."""
+        return 2 * np.pi * r - 8 * r * (np.arccos(half / r) if r > half else 0.0)
+
+    ends = edge, half, 2**0.5 * half
+    parts = [
+        scipy.integrate.quad(lambda r: around(r) * by_hand(degrees(atan(r)), lens), *ends[n : n + 2])[0] for n in (0, 1)
+    ]
+    assert seen[side // 2, side // 2] / light.values[0, 0, 1] == pytest.approx(sum(parts), rel=0.02)
 
 
 def test_a_border_brings_no_light_and_takes_what_goes_beyond():
