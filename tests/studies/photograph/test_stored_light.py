@@ -49,6 +49,7 @@ def taken(order: Order, monkeypatch: pytest.MonkeyPatch, held_bytes: int) -> tup
         return take(order), stored
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ORDERS)
 def test_light_from_files_is_photographed_to_the_bits_of_light_in_memory(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
