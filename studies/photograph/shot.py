@@ -145,8 +145,8 @@ class Order:
         Time from one row's exposure to the next's, such as 15us; the sensor's own by default, which is 0 unless its
         file states row_time_us. Where it isn't 0 lamps that flicker make bands, and a hand's shake leans upright lines.
     lens : str, optional
-        Lens by data in place of the sensor's: cooke_triplet, double_gauss, or a TOML file. Its point spread by image
-        height, falloff, distortion and lateral colour then count; the sensor's own lens by default.
+        Lens by data in place of the sensor's: cooke_triplet, double_gauss, double_gauss_f4, or a TOML file. Its point
+        spread by image height, falloff, distortion and lateral colour then count; the sensor's own lens by default.
     focus_m : float, optional
         Distance of focus in metres: the scene is rendered through a thin lens of the sensor's f-number, a render for
         each f-number; by default all of it is sharp. A picture from a file has no depth.
