@@ -190,7 +190,8 @@ def merged_sensor(sensor: SensorConfig, count: int) -> SensorConfig:
     readings = tuple(burst_of(reading) for reading in sensor.chip.readings)
     pixel = replace(sensor.pixel, column_offset_e=sensor.pixel.column_offset_e * count)
     pixel = pixel_of_readings(pixel, readings) if readings else burst_of(pixel)
-    pixel = replace(pixel, row_noise_e=sensor.pixel.row_noise_e * sqrt(count))
+    shared = {name: getattr(sensor.pixel, name) * sqrt(count) for name in ("row_noise_e", "telegraph_e")}
+    pixel = replace(pixel, **shared)
     apart = [(x, burst_of(x.pixel_of(sensor.pixel))) for x in sensor.chip.channels]
     channels = tuple(
         replace(x, full_well_e=burst.full_well_e, read_noise_e=burst.read_noise_e, dsnu_e=burst.dsnu_e)

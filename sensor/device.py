@@ -32,6 +32,9 @@ class Device:
         Relative gain of each column's amplifier, mean 1; not negative. None where all are 1. (w / 2,) as above.
     hot : (h, w) bool, optional
         Where a pixel is hot: a defect map as a camera's calibration holds it. None where no pixel is.
+    telegraph_e : (h, w) float64, optional
+        Height of each pixel's random telegraph noise [e-], 0 where it has no trap. None where no pixel has one.
+        (h / 2, w / 2) as above.
     readings : tuple of Device
         The chip as each of the sensor's several readings shows it: PRNU and hot pixels of its photodiode, offsets of
         its own, the column amplifiers of all.
@@ -41,6 +44,7 @@ class Device:
     dark_offset_e: NDArray[np.float64]
     column_gain: NDArray[np.float64] | None = None
     hot: NDArray[np.bool_] | None = None
+    telegraph_e: NDArray[np.float64] | None = None
     readings: tuple["Device", ...] = ()
 
     __repr__ = brief
@@ -79,7 +83,7 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
         response = np.maximum(1.0 + pixel.prnu * draws(key, NoiseTerm.PRNU, shape, photodiode), 0.0)
         offset_e = dsnu_e * draws(key, NoiseTerm.DSNU, shape, reading)
         offset_e = block_sums(offset_e) if in_charge else offset_e
-        column_gain = hot = None
+        column_gain = hot = telegraph_e = None
         if pixel.column_offset_e:
             offset_e += pixel.column_offset_e * normals(key, NoiseTerm.COLUMN_OFFSET, one_row)
         if pixel.column_gain_spread:
@@ -87,7 +91,11 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
             column_gain = np.maximum(1.0 + spread, 0.0)
         if pixel.hot_pixel_share:
             hot = normals(key, NoiseTerm.HOT, shape, photodiode) < scipy.special.ndtri(pixel.hot_pixel_share)
-        return Device(photo_response=response, dark_offset_e=offset_e, column_gain=column_gain, hot=hot)
+        if pixel.telegraph_noise_e:
+            rank = scipy.special.ndtr(normals(key, NoiseTerm.TELEGRAPH, offset_e.shape, photodiode))
+            # Under the share, a uniform rank over the share is uniform too, and its logarithm exponential.
+            telegraph_e = pixel.telegraph_e * np.maximum(-np.log(rank / pixel.telegraph_share), 0.0)
+        return Device(response, offset_e, column_gain=column_gain, hot=hot, telegraph_e=telegraph_e)
 
     readings = chip_readings(sensor.photosites, exposure_s=0.0)
     if not several(readings):

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import hypot
+from math import hypot, sqrt
 from typing import Annotated, Any
 
 from rodcone.display import brief
@@ -42,6 +42,10 @@ class PixelConfig:
         Share of a pixel's photo-electrons that each of its four neighbours collects instead.
     row_noise_e : float
         Part of `read_noise_e` that all pixels of a row have together, anew for each row and frame [e-].
+    telegraph_share, telegraph_e : float
+        Share of pixels whose source follower holds a trap, which makes their readings jump (random telegraph noise),
+        and the mean over these pixels of the jump's height [e-]. It is the part `telegraph_noise_e` of `read_noise_e`,
+        which is that of all pixels together, as a report's temporal dark noise is.
     response_bend : float
         c of the response n (1 + c (1 - n / full_well_e)) of n collected electrons: its slope is 1 + c in the dark and
         1 - c at the well, and both ends stay where they are. 0 for a straight one. Development takes any for straight.
@@ -73,6 +77,8 @@ class PixelConfig:
     hot_pixel_dark_current_e_per_s: Annotated[float, (0.0, 1e12, "give electrons per second, 0 for none")] = 0.0
     crosstalk: Annotated[float, (0.0, 0.25, "give the share that goes to each of four neighbours, 0 for none")] = 0.0
     row_noise_e: float = 0.0
+    telegraph_share: Annotated[float, (0.0, 1.0, "give a fraction, 0 for none")] = 0.0
+    telegraph_e: Annotated[float, (0.0, 1e9, "give electrons, 0 for none")] = 0.0
     response_bend: Annotated[float, (-0.5, 0.5, "give a fraction, 0 for a straight response")] = 0.0
     binned_well_e: float = 0.0
 
@@ -86,6 +92,10 @@ class PixelConfig:
         if self.row_noise_e:
             fix = "it is a part of the read noise; give electrons, 0 for none"
             require_range("row_noise_e", self.row_noise_e, 0.0, self.read_noise_e, fix)
+        if self.telegraph_noise_e:
+            parts_e = hypot(self.row_noise_e, self.telegraph_noise_e)
+            fix = "they are parts of the read noise; make telegraph_e or its share less"
+            require_range("telegraph noise with row_noise_e", parts_e, 0.0, self.read_noise_e, fix)
         require_range("prnu with column_gain_spread", self.fixed_gain, 0.0, 1.0, "make the root of their squares less")
 
     @property
@@ -97,6 +107,16 @@ class PixelConfig:
     def fixed_gain(self) -> float:
         """Return the standard deviation over pixels of all relative gains: PRNU and column gains."""
         return hypot(self.prnu, self.column_gain_spread)
+
+    @property
+    def telegraph_noise_e(self) -> float:
+        """Standard deviation of random telegraph noise over all pixels [e-].
+
+        A pixel's jump a is exponential over pixels, of the mean A. Correlated double sampling reads the trap twice and
+        takes the difference, which is -a, 0 or +a with 1/4, 1/2 and 1/4: variance a^2 / 2, and s A^2 over all pixels,
+        of which the share s has a trap.
+        """
+        return sqrt(self.telegraph_share) * self.telegraph_e
 
     @property
     def swing_e(self) -> float:

@@ -28,6 +28,7 @@ class NoiseTerm(IntEnum):
     EXPOSURE = 8  # shot and read noise of one pixel together, in `sensor.kernel.kernel`
     SHAKE = 9  # the path of the image in one exposure: axes and time steps stand for rows and columns
     ROW = 10  # the part of the read noise that the pixels of a row share
+    TELEGRAPH = 11  # which pixels jump and how high, of a device; their traps' states, of an exposure
 
 
 def draw_key(rng: np.random.Generator) -> int:

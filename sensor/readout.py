@@ -12,7 +12,7 @@ from sensor.cfa import block_sums
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.pixel import bent_e
-from sensor.random import NoiseTerm, draw_key, normals, poisson
+from sensor.random import NoiseTerm, draw_key, normals, philox, poisson
 from sensor.raw import RawImage
 from sensor.readings.best_estimate import merged_variance, merged_variances
 from sensor.readings.channels import join
@@ -80,20 +80,38 @@ def convert(
         read_e += pixel_read_noise_e(converter) * normals(key, NoiseTerm.READ, read_e.shape, reading)
     if converter.pixel.row_noise_e:
         read_e += row_noise_e(converter, key, read_e.shape[0], reading)[:, None]
+    if device.telegraph_e is not None:
+        read_e += telegraph_noise_e(device.telegraph_e, key, reading)
     dn = np.rint(read_e / converter.gain_e_per_dn + converter.black_dn)
     dn = np.clip(dn, 0, converter.white_dn).astype(np.uint16)
     return dn if sensor.in_charge else sensor.pixel_sums(dn)
 
 
 def pixel_read_noise_e(converter: SensorConfig) -> float:
-    """Return the part of the read noise that is independent between pixels [e-]: all but the rows' noise."""
-    row_e = converter.pixel.row_noise_e
-    return sqrt(converter.read_noise_e**2 - row_e**2) if row_e else converter.read_noise_e
+    """Normal part of the read noise that each pixel has by itself [e-]."""
+    parts_e2 = converter.pixel.row_noise_e**2 + converter.pixel.telegraph_noise_e**2
+    return sqrt(max(converter.read_noise_e**2 - parts_e2, 0.0)) if parts_e2 else converter.read_noise_e
 
 
 def row_noise_e(converter: SensorConfig, key: int, rows: int, reading: int) -> NDArray[np.float64]:
     """Draw the part of the read noise that the pixels of each row share [e-], (h,)."""
     return converter.pixel.row_noise_e * normals(key, NoiseTerm.ROW, (rows, 1), reading)[:, 0]
+
+
+def telegraph_noise_e(height_e: NDArray[np.float64], key: int, reading: int) -> NDArray[np.float64]:
+    """Draw the random telegraph noise of a reading [e-], (h, w): -1, 0 or 1 times the height of each pixel's jump.
+
+    The trap is full or empty, each half of the time, when the reset level is sampled and again when the signal is; both
+    samples, and those of all frames, are taken to lie further apart than its state lasts.
+    """
+    rows, columns = np.nonzero(height_e)
+    place = columns.astype(np.uint64), rows.astype(np.uint64)
+    terms = (np.full(rows.shape, word, dtype=np.uint64) for word in (int(NoiseTerm.TELEGRAPH), reading))
+    reset, signal, *_ = philox((*place, *terms), key)
+    full = [(word >> np.uint64(31)).astype(np.float64) for word in (reset, signal)]
+    noise_e = np.zeros(height_e.shape)
+    noise_e[rows, columns] = height_e[rows, columns] * (full[1] - full[0])
+    return noise_e
 
 
 def draw_mean_frame(
@@ -206,9 +224,9 @@ def noise_variance(
     """Compute the variance of each sample over chips and exposures [e-^2], in the shape of `expected_e`.
 
     It is the sum of shot noise of signal and dark current, PRNU on the signal, hot pixels, column gains on all that was
-    collected, DSNU and column offsets, read noise of pixels and of rows, and quantisation (a DN^2 / 12). For a bent
-    response it is the variance of its samples, which development takes for straight. Near the full well, the
-    converter's top and 0 DN, it is the variance that clipping leaves (`sensor.readings.clipping`).
+    collected, DSNU and column offsets, read noise, of which rows and telegraph noise are parts, and quantisation (a
+    DN^2 / 12). Of a bent response it is the variance of its samples, which development takes for straight. Near the
+    full well, the converter's top and 0 DN, it is the variance that clipping leaves (`sensor.readings.clipping`).
 
     For a camera that merges several readings, a sample is the merged electrons over the share of the pixel's electrons
     that the readings hold together; clipping is left out. A camera that switches its gain chooses it by `expected_e`,

@@ -18,7 +18,7 @@ from sensor.device import Device
 from sensor.kernel.poisson import alias_table, poisson_single
 from sensor.pixel import bent_e
 from sensor.random import MULTIPLIERS, ROUNDS, WEYL, NoiseTerm
-from sensor.readout import convert, pixel_read_noise_e, row_noise_e, spread_charge
+from sensor.readout import convert, pixel_read_noise_e, row_noise_e, spread_charge, telegraph_noise_e
 
 BANDS_AT_ONCE = 8  # a CPU reads ahead in some dozen places; 40 at once take a third longer, and fight for its cache
 LARGEST = np.finfo(np.float32).max
@@ -172,7 +172,10 @@ def read_frame(
     read_noise_e = dr.opaque(jit.Float64, pixel_read_noise_e(one)) * jit.Float64(read_normal)
     if pixel.row_noise_e:
         read_noise_e += dr.gather(jit.Float64, upload(row_noise_e(one, key, expected_e.shape[0], reading)), row)
-    read_e += upload(device.dark_offset_e, copy_under=COPY_UNDER) + read_noise_e
+    offset_e = device.dark_offset_e
+    if device.telegraph_e is not None:
+        offset_e = offset_e + telegraph_noise_e(device.telegraph_e, key, reading)
+    read_e += upload(offset_e, copy_under=COPY_UNDER) + read_noise_e
     dn = read_e / dr.opaque(jit.Float64, one.gain_e_per_dn) + dr.opaque(jit.Float64, one.black_dn)
     dn = jit.Int(dr.clip(dr.round(dn), 0.0, dr.opaque(jit.Float64, float(one.white_dn))))
     return sensor.pixel_sums(dn.numpy().astype(np.uint16).reshape(expected_e.shape))

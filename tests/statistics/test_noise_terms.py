@@ -44,12 +44,13 @@ TERMS = {
     "column offsets": {"column_offset_e": 40.0},
     "quantisation": {"bits": 9, "read_noise_e": 40.0},  # steps of 80 e-, which only noise of their size spreads
 }
+PARTS = {"telegraph noise": {"read_noise_e": 40.0, "telegraph_share": 0.5, "telegraph_e": 50.0}}  # of the read noise
 ALONE_AND_BESIDE = [*((name,) for name in TERMS), *combinations(TERMS, 2)]
 CAMERAS = ("one reading", "charge", "digital", "gains", "photodiodes", "times")
 
 
 def terms_of(names):
-    return {key: value for name in names for key, value in TERMS[name].items()}
+    return {key: value for name in names for key, value in (TERMS | PARTS)[name].items()}
 
 
 def camera(kind, bits=16, **terms):
@@ -111,6 +112,11 @@ def check_stated_variance(kind, names):
 @pytest.mark.parametrize("kind", CAMERAS)
 def test_dark_current_and_prnu_have_the_variance_that_the_closed_forms_say(kind):
     check_stated_variance(kind, ("dark current", "PRNU"))
+
+
+@pytest.mark.parametrize("kind", CAMERAS)
+def test_telegraph_noise_is_within_the_read_noise_that_the_closed_forms_say(kind):
+    check_stated_variance(kind, ("telegraph noise", "PRNU"))
 
 
 @pytest.mark.thorough
