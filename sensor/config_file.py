@@ -16,7 +16,7 @@ from sensor.config import LensConfig, SensorConfig
 from sensor.curves import RelativeResponsesWarning, Responses, built_in, read_csv, read_curve, rgbw
 from sensor.lens.table import lens_table, terms_of
 from sensor.photodiodes import binned
-from sensor.pixel import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
+from sensor.pixel import MERGED, ChannelReading, Chip, ChipTemperature, PixelConfig, Reading, pixel_of_readings
 
 _SETTINGS = (
     *("bits", "black_level_dn", "white_level_dn", "window_nm"),
@@ -38,10 +38,11 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
         (a name of `sensor.cfa.MOSAICS`, or rows of channels), ``bits``, ``black_level_dn``, ``white_level_dn``,
         ``window_nm``, ``gain``, ``gain_limit``, ``converter_noise_dn``, ``row_time_us``, ``binning`` ("charge" or
         "digital"), ``readout`` ("merged" or "switched") with ``[[readings]]`` (fields of `Reading`), ``[[channels]]``
-        (fields of `ChannelReading`), and ``[responses]``: ``csv``, its ``range_nm``, its ``quantum_efficiency``
-        ("included", "relative", a number, or a table), its ``unit`` ("per_photon" by default, or "per_watt") and
-        ``ir_cut`` (nm, or a table). The tables are files of curves (`rodcone.curve_file.read_columns`), whose names are
-        relative to the TOML's folder, as is the ``table`` of a lens by data.
+        (fields of `ChannelReading`), ``[temperature]`` (fields of `ChipTemperature`), and ``[responses]``: ``csv``, its
+        ``range_nm``, its ``quantum_efficiency`` ("included", "relative", a number, or a table), its ``unit``
+        ("per_photon" by default, or "per_watt") and ``ir_cut`` (nm, or a table). The tables are files of curves
+        (`rodcone.curve_file.read_columns`), whose names are relative to the TOML's folder, as is the ``table`` of a
+        lens by data.
     cfa : str or sequence of str, optional
         Mosaic to use in place of the file's.
 
@@ -112,6 +113,7 @@ class SensorTable:
 
     pixel: PixelConfig
     lens: LensConfig
+    temperature: ChipTemperature | None = None
     cfa: Any = "rgbw"
     bits: Any = None
     black_level_dn: Any = None
@@ -148,8 +150,9 @@ def _sensor(content: dict[str, Any], folder: Path, cfa: Tile | None) -> SensorCo
     apart = tuple(x for x in table.channels if x.channel not in fallen)
     if table.lens.table:
         lens_table(table.lens)
+    pixel = table.pixel if table.temperature is None else table.temperature.pixel_of(table.pixel)
     sensor = SensorConfig(
-        pixel_of_readings(table.pixel, table.readings) if table.readings else table.pixel,
+        pixel_of_readings(pixel, table.readings) if table.readings else pixel,
         table.lens,
         cfa=tile,
         responses=responses,

@@ -125,6 +125,35 @@ class PixelConfig:
 
 
 @dataclass(frozen=True)
+class ChipTemperature:
+    """Temperature of a chip, by which its dark current is another than at the one where it was measured.
+
+    Dark currents double for every `doubling_k`, as EMVA 1288 states the dependence. DSNU and read noise stay.
+
+    Attributes
+    ----------
+    chip_c, measured_c : float
+        Temperature of the chip, and that at which the pixel's dark currents were measured [degrees Celsius].
+    doubling_k : float
+        Rise of the temperature that doubles them [K].
+    """
+
+    chip_c: Annotated[float, (-270.0, 200.0, "give degrees Celsius")]
+    measured_c: Annotated[float, (-270.0, 200.0, "give degrees Celsius")]
+    doubling_k: Annotated[float, (1.0, 100.0, "give kelvin; data sheets have 5 to 10")]
+
+    def __post_init__(self) -> None:
+        require_fields(self, "temperature: ")
+
+    def pixel_of(self, pixel: PixelConfig) -> PixelConfig:
+        """Return the pixel with its dark currents, hot pixels' too, at the chip's temperature."""
+        factor = 2 ** ((self.chip_c - self.measured_c) / self.doubling_k)
+        names = ("dark_current_e_per_s", "hot_pixel_dark_current_e_per_s")
+        changed: dict[str, Any] = {name: factor * getattr(pixel, name) for name in names}
+        return replace(pixel, **changed)
+
+
+@dataclass(frozen=True)
 class Reading:
     """A reading: another gain, another time, or another part of the pixel.
 

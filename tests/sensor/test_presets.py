@@ -18,9 +18,11 @@ from sensor.cfa import BAYER, MOSAICS, RGBW, channels
 from sensor.config import LensConfig, SensorConfig
 from sensor.config_file import read_sensor
 from sensor.curves import Responses, complementary, matched_transmittance, neutral_density, read_csv, read_curve, rgbw
+from sensor.device import draw_device
 from sensor.photodiodes import binned
 from sensor.pixel import PixelConfig
 from sensor.presets import VARIATIONS, low_noise, preset, preset_file, preset_names, table1_output, table1_pixel, vary
+from sensor.readout import read_out
 from studies.study.study_file import EXAMPLES
 
 LEAST = "[pixel]\npitch_um = 2.2\nfill_factor = 0.9\nfull_well_e = 15000\nread_noise_e = 3\ndsnu_e = 4\nprnu = 0.01\n"
@@ -82,10 +84,39 @@ def test_a_copy_that_was_changed_reads_as_it_was_changed(tmp_path):
     assert preset(path, ["GR", "BG"]).cfa == ("GR", "BG")
 
 
+DARK = "dark_current_e_per_s = 3.0\nhot_pixel_share = 0.5\nhot_pixel_dark_current_e_per_s = 40.0\n"
+TEMPERATURE = "[temperature]\nchip_c = 50\nmeasured_c = 36\ndoubling_k = 7\n"
+
+
+def test_dark_current_doubles_with_each_so_many_kelvin_that_the_chip_is_warmer_and_nothing_else_changes(tmp_path):
+    measured = read_sensor(write(tmp_path, LEAST + DARK + LENS))
+    for chip_c, factor in ((50, 4.0), (36, 1.0), (29, 0.5), (39.5, 2**0.5)):
+        table = TEMPERATURE.replace("chip_c = 50", f"chip_c = {chip_c}")
+        sensor = read_sensor(write(tmp_path, LEAST + DARK + LENS + table))
+        currents = sensor.pixel.dark_current_e_per_s, sensor.pixel.hot_pixel_dark_current_e_per_s
+        assert currents == pytest.approx((3.0 * factor, 40.0 * factor), rel=1e-12)
+        names = ("dark_current_e_per_s", "hot_pixel_dark_current_e_per_s")
+        colder = replace(sensor.pixel, **{name: getattr(measured.pixel, name) for name in names})
+        assert replace(sensor, pixel=colder) == measured
+    # a dark frame of 10 s, half of whose pixels are hot, has four times the charge: 4.5 errors of a mean of 4096
+    warm = read_sensor(write(tmp_path, LEAST + DARK + LENS + TEMPERATURE))
+    device = draw_device(warm, (64, 64), np.random.default_rng(1))
+    dn = read_out(np.zeros((64, 64)), warm, device, 10.0, np.random.default_rng(2)).dn
+    for hot, mean_e in ((False, 120.0), (True, 1720.0)):
+        read_e = (dn[device.hot == hot] - warm.black_dn) * warm.gain_e_per_dn
+        assert read_e.mean() == pytest.approx(mean_e, abs=4.5 * np.sqrt((mean_e + 30) / read_e.size))
+
+
 @loop(
     ("text", "parts"),
     [
         ("", ("pixel is missing", "add it")),
+        (LEAST + LENS + TEMPERATURE.replace("measured_c = 36\n", ""), ("temperature: measured_c is missing",)),
+        (
+            LEAST + LENS + TEMPERATURE.replace("doubling_k = 7", "doubling_k = 0"),
+            ("temperature: doubling_k: 0", "kelvin"),
+        ),
+        (LEAST + LENS + TEMPERATURE.replace("chip_c = 50", "chip_c = 323"), ("temperature: chip_c: 323", "Celsius")),
         (LEAST, ("lens is missing", "add it")),
         ("pixel = 3\n" + LENS, ("pixel: the value is not a table",)),
         (LEAST + "read_nose_e = 3\n" + LENS, ("pixel key: 'read_nose_e' is unknown", "did you mean 'read_noise_e'?")),

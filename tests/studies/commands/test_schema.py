@@ -29,6 +29,7 @@ WRONG_SENSORS = [
     (("binning",), "sum"),
     (("readout",), "both"),
     (("bits",), 12.5),
+    (("temperature",), {"chip_c": 50.0, "measured_c": 20.0}),
     (("lens",), None),
     (("lens", "f_number"), None),  # and no table
 ]
