@@ -28,6 +28,7 @@ from sensor.emva1288.from_frames import (
     without_surface,
 )
 from sensor.pixel import PixelConfig
+from studies.twin.tails import noise_histograms, tail_ratio, telegraph_numbers
 
 APART = 0.01  # level of significance at which two samples are told apart, for all tests of one kind together
 LEAST_BENT = 4  # least number of lights to which the response's bend is fitted
@@ -187,6 +188,7 @@ def twin_of(frames: FrameSet, name: str, seed: int = 0) -> Twin:
         for point, a, b, error in zip(points, camera_dn2, twin_dn2, errors, strict=True)
     ]
     compared += _of_pair("dark", dark_dn, twin_dark) + _of_pair("flat", bright_dn, twin_bright)
+    compared.append(_of_tails(dark_dn, twin_dark))
     return Twin(
         figures=figures,
         numbers=numbers,
@@ -264,7 +266,7 @@ def _with_patterns(
     dark: Sequence[NDArray[Any]],
     bright: Sequence[NDArray[Any]],
 ) -> PixelNumbers:
-    """Return the numbers with the columns' part taken out of DSNU and PRNU, and with row noise, bend and full well.
+    """Numbers with the columns' share taken out of DSNU and PRNU, noise of rows and tails, response, and whole well.
 
     Electrons are counted by the response's gain, and the full well from a black level in whole DN.
     """
@@ -286,6 +288,8 @@ def _with_patterns(
     pixel["full_well_e"] = replace(pixel["full_well_e"], value=(figures.white_dn - black) / gain)
     row_e = min(sqrt(_row_variance(dark)) / gain, pixel["read_noise_e"].value)
     pixel["row_noise_e"] = SourcedValue(row_e, f"row means of {len(dark)} dark frames less their mean frame")
+    most_e = sqrt(pixel["read_noise_e"].value ** 2 - row_e**2)
+    pixel |= telegraph_numbers(dark, gain, most_e)
     pixel["response_bend"] = SourcedValue(response.bend, response.source)
     return replace(numbers, pixel=pixel)
 
@@ -374,3 +378,12 @@ def _of_pair(kind: str, camera: Sequence[NDArray[Any]], twin: Sequence[NDArray[A
         # The relative error of the ratio of two standard deviations of `samples` draws each is sqrt(2 / (2 samples)).
         found.append(_compared(name, f"in {kind} frames", of_camera, of_twin, sqrt(1 / samples), 2))
     return found
+
+
+def _of_tails(camera: Sequence[NDArray[Any]], twin: Sequence[NDArray[Any]]) -> TwinFigure:
+    """Compare how far the temporal noise of dark frames exceeds normal noise."""
+    (of_camera, of_twin), errors = zip(
+        *(tail_ratio(noise_histograms(frames)) for frames in (camera, twin)), strict=True
+    )
+    error = hypot(errors[0] / of_camera, errors[1] / of_twin)
+    return _compared("tails of the noise", "in dark frames", of_camera, of_twin, error, 1)
