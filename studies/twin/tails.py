@@ -66,7 +66,7 @@ def telegraph_of(histograms: Floats) -> Telegraph | None:
     best = _fit(whole, np.array([log(0.8 * spread), logit(0.1), log(spread)]))
     *_, share, height = _with_error(histograms, lambda counts: _fit(counts, best))
     ends = [[value + side * NORMAL_95 * error for side in (0, -1, 1)] for value, error in (share, height)]
-    return Telegraph(Interval(*(float(expit(x)) for x in ends[0])), Interval(*(exp(x) for x in ends[1])))
+    return Telegraph(Interval(*(float(expit(x)) for x in ends[0])), Interval(*(exp(min(x, 700.0)) for x in ends[1])))
 
 
 def telegraph_numbers(frames: Sequence[NDArray[Any]], gain_dn_per_e: float, most_e: float) -> dict[str, SourcedValue]:
@@ -80,7 +80,7 @@ def telegraph_numbers(frames: Sequence[NDArray[Any]], gain_dn_per_e: float, most
     return {
         "telegraph_share": SourcedValue(share, f"{source}, {found.share.low:.2g} to {found.share.high:.2g}, 95 %"),
         "telegraph_e": SourcedValue(
-            min(height_e, most_e / sqrt(share)), f"{source}, {ends_e[0]:.3g} to {ends_e[1]:.3g} e-, 95 %"
+            min(height_e, 0.999 * most_e / sqrt(share)), f"{source}, {ends_e[0]:.3g} to {ends_e[1]:.3g} e-, 95 %"
         ),
     }
 

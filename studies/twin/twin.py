@@ -288,8 +288,7 @@ def _with_patterns(
     pixel["full_well_e"] = replace(pixel["full_well_e"], value=(figures.white_dn - black) / gain)
     row_e = min(sqrt(_row_variance(dark)) / gain, pixel["read_noise_e"].value)
     pixel["row_noise_e"] = SourcedValue(row_e, f"row means of {len(dark)} dark frames less their mean frame")
-    most_e = sqrt(pixel["read_noise_e"].value ** 2 - row_e**2)
-    pixel |= telegraph_numbers(dark, gain, most_e)
+    pixel |= telegraph_numbers(dark, gain, sqrt(pixel["read_noise_e"].value ** 2 - row_e**2))
     pixel["response_bend"] = SourcedValue(response.bend, response.source)
     return replace(numbers, pixel=pixel)
 
