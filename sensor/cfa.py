@@ -3,8 +3,8 @@
 Crosstalk mixes a tile's channels: a pixel hands the share c of its electrons to each of its four neighbours
 (`sensor.readout.spread_charge`). So a site reads (1 - 4 c) of the light behind its own filter, and c of that behind
 each neighbour's. What a channel reads of an even field is the mean over its sites, K e, where e are the electrons
-behind each filter alone and K the matrix `channel_mixing`. A camera's maker calibrates neutral, colour matrices and the
-prior over pictures for the channels K e.
+behind each filter alone and K the matrix `channel_mixing`. A camera's maker calibrates neutral and colour matrices for
+the channels K e, and development undoes the crosstalk first (`isp.crosstalk`).
 """
 
 import tomllib

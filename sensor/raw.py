@@ -13,7 +13,7 @@ from rodcone.doors import method
 from rodcone.errors import InputError, require_fields
 from rodcone.types import Floats, require_unmasked
 from sensor.calibration import ChannelNoise, ColourCalibration, NoiseStep
-from sensor.cfa import Tile, channel_mixing, channels, check_covers, check_tile, mask, site_mixing, unit_channel
+from sensor.cfa import Tile, channel_mixing, channels, check_covers, check_tile, mask, unit_channel
 
 # A saturated pixel reads white - 4 sigma_dark or more, give or take half a DN, with probability 1 - 3.2e-5.
 ISO_RANGE = 1e-6, 1e9
@@ -190,11 +190,6 @@ class RawImage:
 
     def _plain(self, channel: str) -> ChannelNoise:
         return ChannelNoise(channel, self.full_well_e, 1.0, self.dark_noise_e, 0.0, self.prnu, self.dark_current_e)
-
-    @property
-    def site_mixing(self) -> Floats:
-        """Return what the tile's sites read of each channel's light in an even field (`sensor.cfa.site_mixing`)."""
-        return site_mixing(self.cfa, self.crosstalk, self._light_shares)
 
     @property
     def channel_mixing(self) -> Floats:

@@ -33,15 +33,12 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...], mixing
     names : tuple of str
         The channels in the order of `sensor.cfa.channels`: R, G and B first, or others in their place.
     mixing : (channel, channel) float64, optional
-        For pixels that exchange charge, `RawImage.channel_mixing`. If there are more than three channels, all then
-        respond by their rows, and what W sees beyond three colours is also in its neighbours.
+        For pixels that exchange charge, `RawImage.channel_mixing`. The calibration is that of the channels as they
+        read, and the fit that of the light behind each filter. If there are more than three channels, all of them then
+        respond by their rows.
     """
     three = len(names) >= 3
-    share = np.eye(len(names))
     by_rows = mixing is not None and len(names) > 3
-    if mixing is not None and by_rows:
-        share = mixing * unmixed(mixing, colour.neutral)
-        share /= share.sum(axis=1, keepdims=True)
     rows = np.linalg.inv(colour.to_srgb) if three and not by_rows else np.zeros((0, 3))
     if len(names) != 3:
         green = names.index("G") if "G" in names else 0
@@ -55,9 +52,12 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...], mixing
             stops = np.log2(np.maximum(neutral, 1e-9) / colour.neutral)
             candidates.append((np.abs(stops - stops[green]).max(), from_xyz @ to_xyz / neutral[:, None]))
         rows = np.vstack([rows, min(candidates, key=lambda pair: pair[0])[1][len(rows) :]])
+    if mixing is not None:
+        share = mixing * unmixed(mixing, colour.neutral)
+        rows = np.linalg.lstsq(share / share.sum(axis=1, keepdims=True), rows, rcond=1e-9)[0]
     unexplained = np.diag([0.0 if three and index < 3 else UNEXPLAINED**2 for index in range(len(names))])
     cross = rows @ MOMENTS_SRGB
-    moments = cross @ rows.T + share @ unexplained @ share.T
+    moments = cross @ rows.T + unexplained
     return ColourFit(names, mean=rows @ MEAN_SRGB, moments=moments, cross=cross if three else grey_of(cross))
 
 

@@ -9,7 +9,7 @@ with the least noise, W, and the paler the colours get.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -107,24 +107,6 @@ class ColourFit:
         target = difference @ (self.cross[index] - moments[:, -1:])
         free = np.linalg.solve(difference @ moments @ difference.T, target)
         return np.concatenate([free, 1.0 - free.sum(axis=0, keepdims=True)]).T
-
-
-def mixed_fit(fit: ColourFit, mixing: Floats, neutral: Floats) -> ColourFit:
-    """Convert a fit of the light behind each filter to one of channels that exchange charge.
-
-    What W sees beyond the colours is then also in its neighbours, and W tells how much of it to subtract from them.
-
-    Parameters
-    ----------
-    fit : ColourFit
-    mixing : (channel, channel) float64
-        Electrons that the fit's channels read from an even field, over those behind each filter (`sensor.cfa`).
-    neutral : (channel,) float64
-        Electrons behind each filter from a neutral, in any unit.
-    """
-    share = mixing * neutral
-    share /= share.sum(axis=1, keepdims=True)
-    return replace(fit, mean=share @ fit.mean, moments=share @ fit.moments @ share.T, cross=share @ fit.cross)
 
 
 def fit_colours(

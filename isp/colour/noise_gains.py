@@ -84,7 +84,7 @@ def colours_in_noise(raw: RawImage, fit: ColourFit, balance: WhiteBalance, unit:
     names = raw.channels
     neutral = balance.neutral if balance.given is None else balance.given
     if neutral is None:
-        neutral = raw.channel_mixing @ neutral_response(names, complementary(rgbw()) if "C" in names else None)
+        neutral = neutral_response(names, complementary(rgbw()) if "C" in names else None)
     index = [names.index(name) for name in fit.channels[:3]]
     response = neutral / neutral[names.index(unit)]
     mean_e, snr = mean_snr(raw, unit)

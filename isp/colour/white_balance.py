@@ -7,19 +7,20 @@ applies.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from isp.colour.highlights import saturated_nearby
+from isp.crosstalk import is_undone
 from isp.planes import rows_at
 from render.illuminants import illuminant
 from rodcone.display import brief
 from rodcone.errors import InputError
 from rodcone.types import Floats
-from sensor.cfa import mask
+from sensor.cfa import mask, unmixed
 from sensor.curves import Responses, built_in, electrons_from_neutral
 from sensor.raw import RawImage, channel_variance
 
@@ -66,6 +67,15 @@ class WhiteBalance:
     def expected(self, raw: RawImage) -> Floats:
         """Return the response to a neutral before the picture is known: given or else calibrated, (channel,)."""
         return self.response(raw) if self.given is None else self.given
+
+    def without_crosstalk(self, raw: RawImage) -> WhiteBalance:
+        """Return the same responses as the raw image reads them once its crosstalk is undone."""
+        if not is_undone(raw.crosstalk):
+            return self
+        neutral, given = (
+            None if read is None else unmixed(raw.channel_mixing, read) for read in (self.neutral, self.given)
+        )
+        return replace(self, neutral=neutral, given=given)
 
     def gains(self, raw: RawImage, planes: NDArray[np.floating]) -> tuple[Floats, Mapping[str, BalanceSource]]:
         """Compute the gains of a frame, and state where they come from.

@@ -5,8 +5,8 @@ light. A signal is electrons over those of what the camera takes for white; its 
 is, its noise, well, exposure and mosaic don't.
 """
 
-from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from rodcone.errors import InputError, read_errors
 from rodcone.files import replacing
-from sensor.cfa import unmixed
 
 PATCH = 8  # pixels a side
 LETTERS = ("R", "G", "B", "W")
@@ -48,10 +47,6 @@ class Prior:
         Variance in each direction outside the basis.
     source : str
         Command, versions, seed and hashes of what it was trained from, as JSON.
-    mixing : (4, 4) float64 or None
-        Of a camera whose pixels exchange charge: signals of the channels as they read, over those behind each filter
-        alone; rows sum to 1. `neutrals_e` are as they read; the other fields are of signals behind each filter alone,
-        and `mixture` mixes them.
     """
 
     neutrals_e: NDArray[np.float64]
@@ -62,7 +57,6 @@ class Prior:
     factors: NDArray[np.float32]
     rest: NDArray[np.float32]
     source: str
-    mixing: NDArray[np.float64] | None = None
 
     @property
     def neutral_e(self) -> NDArray[np.float64]:
@@ -105,55 +99,7 @@ def mixture(prior: Prior, size: int = PATCH) -> Mixture:
     covariances = spread @ spread.swapaxes(1, 2)
     outside = np.eye(len(basis), dtype=np.float32) - basis @ basis.T
     covariances += prior.rest[:, None, None] * outside
-    if prior.mixing is not None:
-        means, covariances = _mixed(means.astype(np.float64), covariances, prior.mixing)
     return Mixture(size, np.log(prior.weights.astype(np.float64)), means.astype(np.float64), covariances)
-
-
-def _mixed(
-    means: NDArray[np.float64], covariances: NDArray[np.float32], mixing: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-    """Convert Gaussians over roots of signals x to those over roots of signals K x, to first order about the means.
-
-    Crosstalk is counted as if a pixel's neighbours showed the same light as the pixel itself.
-    """
-    components, values = means.shape
-    roots = np.abs(means).reshape(components, -1, 4)
-    signals = roots**2 + np.diagonal(covariances, axis1=1, axis2=2).reshape(components, -1, 4)
-    mixed_roots = np.maximum(np.sqrt(roots**2 @ mixing.T), 1e-6)
-    slopes = (mixing * roots[..., None, :] / mixed_roots[..., None]).astype(np.float32)  # (component, pixel, 4, 4)
-    pixels = values // 4
-    blocks = covariances.reshape(components, pixels, 4, pixels, 4)
-    result = np.einsum("kpab,kpbqd,kqcd->kpaqc", slopes, blocks, slopes, optimize=True)
-    result = result.reshape(components, values, values)
-    variances = np.diagonal(result, axis1=1, axis2=2).reshape(components, -1, 4)
-    mean_squares = np.maximum(signals @ mixing.T - variances, mixed_roots**2)
-    return np.sqrt(mean_squares).reshape(components, values), result
-
-
-def mixed_prior(prior: Prior, mixing: NDArray[np.float64], white_e: NDArray[np.float64]) -> Prior:
-    """Return the prior of a camera whose pixels exchange charge.
-
-    Parameters
-    ----------
-    prior : Prior
-        Of the light behind each filter.
-    mixing : (4, 4) float64
-        Electrons that R, G, B and W read of an even field, over those behind each filter (`sensor.cfa`).
-    white_e : (4,) float64
-        Electrons of white that they read under the scene's light.
-    """
-    neutrals_e = prior.neutrals_e @ mixing.T
-    behind_e = unmixed(mixing, white_e)
-    signals = mixing * behind_e
-    signals /= signals.sum(axis=1, keepdims=True)
-    return _prior_with(prior, tuple(np.round(signals, 4).ravel()), tuple((neutrals_e / neutrals_e[:, 1:2]).ravel()))
-
-
-@lru_cache(maxsize=8)
-def _prior_with(prior: Prior, mixing: tuple[float, ...], neutrals_e: tuple[float, ...]) -> Prior:
-    """Return the same object for the same camera and light, because caches know a prior by its identity."""
-    return replace(prior, mixing=np.reshape(mixing, (4, 4)), neutrals_e=np.reshape(neutrals_e, (-1, 4)))
 
 
 @cache

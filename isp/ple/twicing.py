@@ -55,8 +55,7 @@ def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
     stable : (h, w, channel) float32
         The same in units of noise.
     raw : RawImage
-        Of a tile of 1, 2 or 4 pixels a side. Saturated samples say nothing, nor, where pixels exchange charge, those at
-        the frame's edge.
+        Of a tile of 1, 2 or 4 pixels a side. Saturated samples say nothing.
     """
     names = raw.channels
     guide = next((names.index(name) for name in GUIDES if name in names), None)
@@ -65,8 +64,6 @@ def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
         return
     sites = channel_map(raw.cfa, raw.shape)[..., None] == np.array(names)
     sites &= ~raw.saturated[..., None]
-    if raw.crosstalk:  # at the frame's edge charge stays that others hand on
-        sites[[0, -1]] = sites[:, [0, -1]] = False
     laws = [raw.noise_of(name) for name in names]
     shot, dark = (
         np.array(values, np.float32) for values in zip(*((x.shot, x.dark_noise_e**2) for x in laws), strict=True)

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from isp.colour.colour_fit import ColourFit
 from isp.colour.noise_gains import NoiseGains, colours_in_noise, measured_gains
 from isp.colour.white_balance import WhiteBalance
+from isp.crosstalk import without_crosstalk
 from isp.defects import interpolate_defects
 from isp.interleaved.pipeline import picture_bayer, picture_interleaved, picture_interleaved_paper
-from isp.levelling import levelled
 from isp.picture import Picture
 from isp.processors.any_mosaic import picture_any_mosaic
 from isp.processors.bayer_denoised import picture_bayer_nlm, picture_demosaicked_first, picture_denoised_first
@@ -80,16 +80,18 @@ class Processor:
         balance: ArrayLike | WhiteBalance | None = None,
         **options: object,
     ) -> Picture:
-        """Replace defective pixels, level the sites of each channel, and develop the picture.
+        """Replace defective pixels, undo crosstalk, and develop the picture.
 
         Parameters
         ----------
         raw : RawImage
         matrix : (3, 3) array_like or ColourFit
-            From the balanced channels `colours` to linear sRGB (`isp.colour.colour_fit.fit_matrix`, `fit_colours`).
+            From the balanced channels `colours` to linear sRGB (`isp.colour.colour_fit.fit_matrix`, `fit_colours`),
+            each channel as its own filter makes it, whatever the raw image's crosstalk.
         neutral : (channel,) array_like, optional
-            Calibrated response to a neutral, in the order of `sensor.cfa.channels`, for the white balance of pictures
-            that are too dark for Gray World; by default that of the project's own curves under D65.
+            Calibrated response to a neutral, in the order of `sensor.cfa.channels`, as the raw image reads it with its
+            crosstalk, for the white balance of pictures that are too dark for Gray World; by default that of the
+            project's own curves under D65.
         balance : (channel,) array_like or WhiteBalance, optional
             Response to what should become neutral, such as a file's as-shot neutral, instead of Gray World's means. A
             `WhiteBalance` holds both responses.
@@ -98,12 +100,18 @@ class Processor:
         """
         raw = interpolate_defects(raw)
         white_balance = WhiteBalance.of(raw, neutral, balance)
+        scale = 1.0
         if raw.crosstalk:
-            raw = levelled(raw, white_balance.expected(raw))
+            # A neutral has the electrons that the unit's channel reads of it, with crosstalk.
+            unit = raw.channels.index(self.unit or raw.unit_channel)
+            behind_filters = white_balance.without_crosstalk(raw)
+            scale = float(white_balance.response(raw)[unit] / behind_filters.response(raw)[unit])
+            raw, white_balance = without_crosstalk(raw, white_balance.expected(raw)), behind_filters
         colours = ColourFit.of(matrix)
         if self.noise_gains is not None and set(self.colours) <= set(raw.channels):  # others are refused below
             colours = colours_in_noise(raw, colours, white_balance, self.unit, self.noise_gains)
-        return self.picture(raw, colours, balance=white_balance, **options)
+        picture = self.picture(raw, colours, balance=white_balance, **options)
+        return picture if scale == 1.0 else replace(picture, rgb=picture.rgb * scale)
 
 
 _MALVAR = partial(picture_demosaicked, demosaic=malvar)

@@ -59,7 +59,7 @@ def picture_yamagami(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance
     require_letters(raw, CHANNELS)
     if balance.neutral is None:
         behind_density = np.array([1.0, 1.0, 1.0, matched_transmittance(rgbw())])
-        balance = replace(balance, neutral=raw.channel_mixing @ (neutral_response(CHANNELS) * behind_density))
+        balance = replace(balance, neutral=neutral_response(CHANNELS) * behind_density)
     mosaic, gains, sources = balance_mosaic(raw, raw.electrons, balance)
     planes = np.stack([tent_means(mosaic, raw.cfa, channel) for channel in "RGB"], axis=-1)
     rgb = to_rgb(raw, planes, gains, colours, MATCHED_RADIUS)
@@ -80,7 +80,7 @@ def picture_complementary(raw: RawImage, colours: ColourFit, *, balance: WhiteBa
     order = [names.index(true[stand_in]) for stand_in in channels(named.cfa)]
     neutral = balance.neutral
     if neutral is None:
-        neutral = raw.channel_mixing @ neutral_response(names, complementary(rgbw()))
+        neutral = neutral_response(names, complementary(rgbw()))
     reordered = WhiteBalance(neutral[order], None if balance.given is None else balance.given[order])
     picture = picture_yamagami(named, colours, balance=reordered)
     return replace(picture, balance={true[stand_in]: source for stand_in, source in picture.balance.items()})

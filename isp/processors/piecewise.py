@@ -19,7 +19,7 @@ from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture
 from isp.ple.mosaic import SIDES
 from isp.ple.overlap import STRIDE
-from isp.ple.prior import LETTERS, Prior, mixed_prior, own_prior
+from isp.ple.prior import LETTERS, Prior, own_prior
 from isp.ple.pyramid import reconstruct
 from isp.processors.any_mosaic import rgb_of_channels
 from isp.processors.demosaic import require_bayer
@@ -116,7 +116,6 @@ def develop_planes(raw: RawImage, colours: ColourFit, balance: WhiteBalance, pri
     """Develop a raw image as `picture_ple` does; the caller has checked its tile."""
     names, unit = raw.channels, raw.unit_channel
     index = [LETTERS.index(name) for name in names]
-    prior = _as_it_reads(raw, prior, balance.neutral)
     white_e = prior.neutral_e.copy()
     if balance.neutral is not None:
         if curves_differ(prior, balance.neutral, index):
@@ -131,8 +130,7 @@ def develop_planes(raw: RawImage, colours: ColourFit, balance: WhiteBalance, pri
     gains, sources = balance.gains(raw, planes)
     noise = relative_noise(raw, planes, INDEPENDENT * variance, gains, colours)
     coloured = {"R", "G", "B"} <= set(names)
-    # If pixels exchange charge, W takes part, because it tells how much of its charge is in the colours.
-    used = 3 if coloured and not (raw.crosstalk and colours.plain is None) else len(names)
+    used = 3 if coloured else len(names)
     matrix = colours.matrix(names[:used], noise[:used]) if coloured else None
     highlights = Highlights.of(raw, gains)
     rgb = np.empty((*raw.shape, 3))
@@ -140,19 +138,6 @@ def develop_planes(raw: RawImage, colours: ColourFit, balance: WhiteBalance, pri
         balanced = highlights.held(planes[rows, :, :used].astype(np.float64) * gains[:used], rows)
         rgb[rows] = rgb_of_channels(raw, balanced, colours, noise) if matrix is None else balanced @ matrix.T
     return PiecewisePicture(Picture(rgb, sources), planes, gains)
-
-
-def _as_it_reads(raw: RawImage, prior: Prior, neutral: Floats | None) -> Prior:
-    """Mix a prior's channels as crosstalk does, under the light of the calibrated neutral."""
-    if not raw.crosstalk:
-        return prior
-    index = [LETTERS.index(name) for name in raw.channels]
-    mixing = np.eye(len(LETTERS))
-    mixing[np.ix_(index, index)] = raw.channel_mixing
-    white_e = mixing @ prior.neutral_e
-    if neutral is not None:
-        white_e[index] = neutral / neutral[raw.channels.index(raw.unit_channel)]
-    return mixed_prior(prior, mixing, white_e)
 
 
 def curves_differ(prior: Prior, neutral: Floats, index: Sequence[int]) -> bool:

@@ -8,9 +8,9 @@ import numpy as np
 import skimage
 from numpy.typing import ArrayLike, NDArray
 
-from isp.colour.colour_fit import ColourFit, fit_colours, fit_through_neutral, grey_of, mixed_fit, training
+from isp.colour.colour_fit import ColourFit, fit_colours, fit_through_neutral, grey_of, training
 from isp.colour.white_balance import WhiteBalance
-from isp.levelling import levelled
+from isp.crosstalk import is_undone, without_crosstalk
 from isp.picture import Picture
 from isp.planes import bilinear
 from isp.processors.catalogue import Processor
@@ -157,16 +157,20 @@ def _srgb_of_xyz(white: Floats) -> NDArray[np.float64]:
 
 
 def colour_fit(sensor: SensorConfig, processor: Processor, light: Light) -> ColourFit:
-    """Fit the processor's colours and the mosaic's other channels under a light, on the ColorChecker's patches."""
+    """Fit the processor's colours and the mosaic's other channels under a light, on the ColorChecker's patches.
+
+    The channels are those of the light behind each filter, because development undoes crosstalk first
+    (`isp.crosstalk`). Only if it doesn't are they the channels as they are read.
+    """
     nm, width = light.wavelength_nm, light.width_nm
     surfaces = np.array([held(reflectance).band_average(nm, width) for _, reflectance in color_checker_reflectances()])
     colours = processor.colours or sensor.channels
     names = (*colours, *(x for x in sensor.channels if x not in colours))
     index = [sensor.channels.index(x) for x in names]
-    weights = electrons_per_irradiance(sensor, nm, width, 1.0, light.lamp)[index]
+    weights = electrons_per_irradiance(sensor, nm, width, 1.0, light.lamp)
+    weights = (weights if is_undone(sensor.pixel.crosstalk) else mixing_of(sensor) @ weights)[index]
     responses = weights / (photons_per_joule(nm) * width)
-    fit = fit_colours(names, responses, nm, light.spectrum, surfaces, width, light.lamp)
-    return mixed_fit(fit, mixing_of(sensor)[np.ix_(index, index)], weights @ light.spectrum)
+    return fit_colours(names, responses, nm, light.spectrum, surfaces, width, light.lamp)
 
 
 def develop_to_scale(
@@ -242,13 +246,14 @@ def balance_delta_e(
         Response to what should come out neutral; left out, Gray World finds it in the exposure.
     """
     neutral = neutral_electrons(sensor, light, 1.0)
-    raw = levelled(raw, neutral)
-    gains, _ = WhiteBalance.of(raw, neutral, balance).gains(raw, bilinear(raw))
     card, scale = _even_field(raw, sensor, light)
+    white_balance = WhiteBalance.of(raw, neutral, balance).without_crosstalk(raw)
+    raw, card = (without_crosstalk(x, neutral) for x in (raw, card))
+    gains, _ = white_balance.gains(raw, bilinear(raw))
     down, across = len(raw.cfa), len(raw.cfa[0])
-    tiles = bilinear(levelled(card, neutral))[2 * down : 4 * down, 2 * across : 4 * across]
+    tiles = bilinear(card)[2 * down : 4 * down, 2 * across : 4 * across]
     read = dict(zip(raw.channels, tiles.mean(axis=(0, 1)) * gains, strict=True))
-    unit_e = scale * neutral[raw.channels.index(raw.unit_channel)]
+    unit_e = scale * white_balance.response(raw)[raw.channels.index(raw.unit_channel)]
     names = colours.channels[:3]
     developed = GREY * colours.matrix(names) @ [read[name] / unit_e for name in names]
     lab, grey = (skimage.color.xyz2lab(SRGB_TO_XYZ @ rgb) for rgb in (developed, np.full(3, GREY)))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from isp.colour.calibrated_colours import fit_of_calibration, neutral_under
 from isp.colour.encoding import encode
+from isp.crosstalk import is_undone
 from isp.picture import Picture
 from isp.processors.catalogue import default_processor
 from isp.processors.own import processor_of, require_consent
@@ -81,7 +82,7 @@ def develop(
         raise InputError(
             "raw: it holds no colour calibration; allowed: one beside it; give calibrate(sensor, illuminant('D65')) too"
         )
-    colours = fit_of_calibration(colour, raw.channels, raw.channel_mixing if raw.crosstalk else None)
+    colours = fit_of_calibration(colour, raw.channels, raw.channel_mixing if is_undone(raw.crosstalk) else None)
     software = processor_of(name)
     response = _asked_neutral(colour, white_balance or default_balance(name))
     return software.develop(raw, colours, neutral=colour.neutral, balance=response)

@@ -24,7 +24,7 @@ const PIXEL = {
   column_gain_spread: ["Column gains", 0, 0.1, "cube", ""], column_offset_e: ["Column offsets", 0, 100, "cube", "e⁻"],
   hot_pixel_share: ["Hot pixels, share", 0, 0.05, "cube", ""],
   hot_pixel_dark_current_e_per_s: ["Hot pixels, current", 0, 1e6, "cube", "e⁻/s"],
-  crosstalk: ["Crosstalk", 0, 0.2, "cube", ""], full_well_e: ["Full well", 100, 1e6, "log", "e⁻"],
+  crosstalk: ["Crosstalk", 0, 0.1, "cube", ""], full_well_e: ["Full well", 100, 1e6, "log", "e⁻"],
 };
 const SETTINGS = {
   neighbourhood: ["Neighbourhood", 3, 41, "odd", "px"], patch: ["Patch", 1, 9, "odd", "px"],

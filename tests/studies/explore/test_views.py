@@ -106,7 +106,7 @@ def test_terms_that_belong_to_readings_are_refused_in_one_line():
 
 def test_crosstalk_is_no_noise():
     """Where light alone is noisy, noise over the square root of what each pixel collects has a variance of 1."""
-    for crosstalk in [0.0, 0.2]:
+    for crosstalk in [0.0, 0.1]:
         quiet = {"read_noise_e": 0.0, "dsnu_e": 0.0, "prnu": 0.0, "dark_current_e_per_s": 0.0, "crosstalk": crosstalk}
         controls = Controls(pixel=quiet, exposure=TIME, exposure_s=0.01, level_cd_m2=3.0)
         shot = photograph(small_transport(), controls)
@@ -120,7 +120,7 @@ def test_crosstalk_is_no_noise():
 
 def test_snr_is_of_what_a_pixel_collects():
     """Of light alone it is the square root of the electrons, which crosstalk makes those of the neighbours too."""
-    quiet = {"read_noise_e": 0.0, "dsnu_e": 0.0, "prnu": 0.0, "dark_current_e_per_s": 0.0, "crosstalk": 0.2}
+    quiet = {"read_noise_e": 0.0, "dsnu_e": 0.0, "prnu": 0.0, "dark_current_e_per_s": 0.0, "crosstalk": 0.1}
     controls = Controls(pixel=quiet, exposure=TIME, exposure_s=0.01, level_cd_m2=3.0, bits=16)
     shot = photograph(small_transport(), controls)
     quantised = shot.exposed.sensor.gain_e_per_dn**2 / 12
