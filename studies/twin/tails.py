@@ -22,6 +22,7 @@ from sensor.emva1288.from_frames import NORMAL_95, Interval
 BLOCKS = 16  # parts of the rows, each left out in turn: the scatter of what remains gives the error
 LEAST_TOLD = 4.0  # errors that normal noise has, from which its excess is told from 0: one camera in 1e4, or fewer
 LEAST_NOISE_DN = 0.7  # under which rounding alone makes the histogram another than a normal one
+MOST_SHARE = 0.5  # of pixels with a trap: if more fit, pixels differ in their normal noise, which isn't jumps
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,11 @@ def noise_histograms(frames: Sequence[NDArray[Any]]) -> Floats:
     return np.asarray(np.sum(counts, axis=1), dtype=np.float64)
 
 
+def is_rounding(histograms: Floats) -> bool:
+    """Return whether the noise is so small that the histogram is one of rounding."""
+    return sqrt(_moment(histograms.sum(axis=0), 2)) < sqrt(2) * LEAST_NOISE_DN
+
+
 def excess_kurtosis(histograms: Floats) -> tuple[float, float]:
     """Return the excess kurtosis of the differences, 0 for normal noise, and the error that it then has."""
     whole = histograms.sum(axis=0)
@@ -57,15 +63,21 @@ def tail_ratio(histograms: Floats) -> tuple[float, float]:
 
 
 def telegraph_of(histograms: Floats) -> Telegraph | None:
-    """Fit random telegraph noise to the differences; None where their tails aren't told from normal noise's."""
+    """Fit random telegraph noise to the differences; return None where there is none.
+
+    There is none where the tails aren't told from normal noise's, and where more than `MOST_SHARE` of the pixels would
+    have a trap.
+    """
     excess, error = excess_kurtosis(histograms)
     whole = histograms.sum(axis=0)
     spread = sqrt(_moment(whole, 2))
-    if not excess > LEAST_TOLD * error or spread < sqrt(2) * LEAST_NOISE_DN:
+    if not excess > LEAST_TOLD * error or is_rounding(histograms):
         return None
     best = _fit(whole, np.array([log(0.8 * spread), logit(0.1), log(spread)]))
     *_, share, height = _with_error(histograms, lambda counts: _fit(counts, best))
     ends = [[value + side * NORMAL_95 * error for side in (0, -1, 1)] for value, error in (share, height)]
+    if expit(ends[0][2]) > MOST_SHARE:
+        return None
     return Telegraph(Interval(*(float(expit(x)) for x in ends[0])), Interval(*(exp(min(x, 700.0)) for x in ends[1])))
 
 

@@ -28,7 +28,7 @@ from sensor.emva1288.from_frames import (
     without_surface,
 )
 from sensor.pixel import PixelConfig
-from studies.twin.tails import noise_histograms, tail_ratio, telegraph_numbers
+from studies.twin.tails import is_rounding, noise_histograms, tail_ratio, telegraph_numbers
 
 APART = 0.01  # level of significance at which two samples are told apart, for all tests of one kind together
 LEAST_BENT = 4  # least number of lights to which the response's bend is fitted
@@ -188,7 +188,7 @@ def twin_of(frames: FrameSet, name: str, seed: int = 0) -> Twin:
         for point, a, b, error in zip(points, camera_dn2, twin_dn2, errors, strict=True)
     ]
     compared += _of_pair("dark", dark_dn, twin_dark) + _of_pair("flat", bright_dn, twin_bright)
-    compared.append(_of_tails(dark_dn, twin_dark))
+    compared += _of_tails(dark_dn, twin_dark)
     return Twin(
         figures=figures,
         numbers=numbers,
@@ -379,10 +379,11 @@ def _of_pair(kind: str, camera: Sequence[NDArray[Any]], twin: Sequence[NDArray[A
     return found
 
 
-def _of_tails(camera: Sequence[NDArray[Any]], twin: Sequence[NDArray[Any]]) -> TwinFigure:
-    """Compare how far the temporal noise of dark frames exceeds normal noise."""
-    (of_camera, of_twin), errors = zip(
-        *(tail_ratio(noise_histograms(frames)) for frames in (camera, twin)), strict=True
-    )
+def _of_tails(camera: Sequence[NDArray[Any]], twin: Sequence[NDArray[Any]]) -> list[TwinFigure]:
+    """Compare how far the temporal noise of dark frames exceeds normal noise, unless it is one of rounding."""
+    both = [noise_histograms(frames) for frames in (camera, twin)]
+    if any(map(is_rounding, both)):
+        return []
+    (of_camera, of_twin), errors = zip(*map(tail_ratio, both), strict=True)
     error = hypot(errors[0] / of_camera, errors[1] / of_twin)
-    return _compared("tails of the noise", "in dark frames", of_camera, of_twin, error, 1)
+    return [_compared("tails of the noise", "in dark frames", of_camera, of_twin, error, 1)]

@@ -1,6 +1,7 @@
 """A camera's twin: frames drawn by independent code, measured, photographed again, and told apart where they differ."""
 
 import json
+import sys
 from math import nan
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from PIL import Image
 from sensor.cameras.frame_sets import FrameSet, LightFrames
 from sensor.cameras.frames import measure_set
 from sensor.config_file import read_sensor
-from studies.twin.tails import excess_kurtosis, noise_histograms, tail_ratio, telegraph_of
+from studies.twin.tails import excess_kurtosis, is_rounding, noise_histograms, tail_ratio, telegraph_of
 from studies.twin.twin import response_of, twin_of
 
 SHAPE, K_DN_PER_E, OFFSET_DN, READ_DN = (64, 96), 0.25, 40, 2.0
@@ -88,6 +89,23 @@ def test_normal_noise_and_noise_of_rows_have_no_tails():
         ratio, of_ratio = tail_ratio(noise_histograms(dark))
         assert ratio == pytest.approx(np.pi / 2, abs=4 * of_ratio)
         assert of_ratio < 0.02
+
+
+def test_pixels_that_differ_in_their_normal_noise_have_no_traps():
+    """Half at 0.8 and half at 1.2 of the noise: an excess kurtosis of 0.44, which traps in nearly all pixels fit."""
+    rng = np.random.default_rng(4)
+    sigma = np.where(rng.random((64, 96)) < 0.5, 1.6, 2.4)
+    histograms = noise_histograms([np.rint(rng.normal(40.0, sigma)).astype(np.uint16) for _ in range(16)])
+    excess, error = excess_kurtosis(histograms)
+    assert excess > 8 * error
+    assert telegraph_of(histograms) is None
+
+
+def test_noise_of_rounding_has_no_verdict_on_its_tails(monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "READ_DN", 0.3)
+    frames = frames_of()
+    assert is_rounding(noise_histograms(frames.lights[-1].frames))
+    assert not any(one.name == "tails of the noise" for one in twin_of(frames, "quiet").comparisons)
 
 
 @pytest.mark.thorough
