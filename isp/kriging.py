@@ -47,7 +47,7 @@ def reconstruct_linear(raw: RawImage) -> Reconstruction:
 
 
 def linear_strips(raw: RawImage) -> Iterator[tuple[slice, Plane, Plane]]:
-    """Yield `reconstruct_linear` strip by strip: rows, estimate [e-] and noise gain, with the same bits."""
+    """Yield the result of `reconstruct_linear` in strips, bit for bit: rows, estimate [e-] and noise gain."""
     names = raw.channels
     plain = replace(without_prnu(raw), noise_steps=())
     values = stabilise_raw(raw.electrons, plain)
@@ -67,8 +67,10 @@ def linear_strips(raw: RawImage) -> Iterator[tuple[slice, Plane, Plane]]:
             estimate, noise_gain = (
                 np.where(beside[strip][..., None], *both) for both in zip(apart, (estimate, noise_gain), strict=True)
             )
-        # The inverse adds the 1/4 e- that a mean of roots loses. The noise that remains in the estimate hasn't lost it,
-        # so its part is subtracted. A channel with its own readings counts electrons over its factor of shot noise.
+        # `unstabilise` expects the mean of noisy samples, and adds the 1/4 e- by which noise lowers a mean of roots.
+        # The noise that is left in the estimate (`noise_gain`, as a share of a sample's variance) was not averaged
+        # away, so that share of the 1/4 e- is subtracted again. Values of a channel with its own readings are
+        # electrons divided by `noise.shot`, which is undone at the end.
         electrons = np.empty_like(estimate)
         for index, noise in enumerate(noises):
             counted = unstabilise(estimate[..., index], noise.dark_noise_e / noise.shot) - noise_gain[..., index] / 4

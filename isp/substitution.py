@@ -75,8 +75,8 @@ def substitution_weight(snr: float, threshold: float) -> float:
 def matrix_with_white(fit: ColourFit, noise: NDArray[np.float64], weight: float) -> NDArray[np.float64]:
     """Compute the matrix from balanced R, G, B and W to linear sRGB, with luminance from W in the share `weight`.
 
-    W contributes to the colours by weights that minimise the expected error at the given noise. A plain matrix doesn't
-    use W for the colours, and takes W itself as the luminance.
+    W contributes to the colours by weights that minimise the expected error at the given noise. A fit with a given 3x3
+    matrix (`fit.plain`) leaves W out of the colours, and the luminance is then W itself.
 
     Parameters
     ----------

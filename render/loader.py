@@ -165,7 +165,7 @@ def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[Load
 
 
 def load_unlit(scene: Scene, size: tuple[int, int]) -> MitsubaScene:
-    """Load the scene without its lights and without merging meshes, to look up what is seen under any light."""
+    """Load the scene without lights and without merging meshes, to find what each pixel sees, whatever the light."""
     description = scene.lit({})
     description["sensor"] = {**description["sensor"], "film": _recorder(size)}
     return _load(scene, description)

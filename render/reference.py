@@ -100,7 +100,8 @@ def read_reference(path: Path, scene: Scene) -> Reference | None:
 def ready_light(scene: Scene, film: Film) -> Reference | None:
     """Find the reference of a scene and film, or a larger one (`_MULTIPLES`), which is averaged to the film's size.
 
-    Return None if there is neither. The result also has the scene's illuminance meter, which traces at its first call.
+    Return None if there is neither. The result has a meter of the scene's illuminance if the scene has a reference
+    plane and a backend can trace. The irradiance is traced when it is first asked for.
     """
     height, width = film.size
     for times in _MULTIPLES:

@@ -68,7 +68,10 @@ def imported(module: str) -> ModuleType:
 
 
 def _value(kind: str | type, fix: str, by_name: str = "") -> Check:
-    """Return a check for an object of a class or that at ``module:name``; `by_name` names what makes it of a name."""
+    """Return a check that an argument is an object of a class, which is given itself or as ``module:name``.
+
+    `by_name` is the ``module:name`` of a function that makes the object from a name or a path, if a user may give one.
+    """
 
     def check(name: str, value: object) -> Any:
         if by_name and isinstance(value, str | Path):

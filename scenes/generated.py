@@ -41,7 +41,7 @@ def generated(seed: int = 0, light: str | None = None) -> Scene:
         "meter_card": panel(floor(0.0, 0.001, 0.75), 0.16, 0.08, matte(grey(0.18))),
     }
 
-    # on the wall: leaves whose sizes follow a power law, as things in the world do, each before the one drawn earlier
+    # on the wall: leaves, each in front of those drawn earlier; their sizes follow a power law, as in nature
     for index in range(LEAVES):
         size_m = 0.02 * (1 - rng.random() * (1 - (0.02 / 0.35) ** 1.5)) ** (-1 / 1.5)
         pose = translate(rng.uniform(-0.65, 0.65), rng.uniform(0.0, 0.8), -0.5 + 0.0005 * index)

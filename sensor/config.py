@@ -197,9 +197,9 @@ class SensorConfig:
     def metered_well_e(self, channel: str) -> float:
         """Return the photo-electrons of the whole pixel at which its most sensitive reading is full.
 
-        This is what an automatic exposure aims at. What shorter times and smaller photodiodes hold beyond it is
-        headroom for lamps. For a channel that is read with a time, density or gain of its own, it is what that reading
-        holds.
+        An automatic exposure aims at this. Readings with a shorter time or a smaller photodiode take more light, which
+        leaves headroom for lamps. If the channel has a time, density or gain of its own, the result is what its own
+        reading holds.
         """
         for apart in self.chip.channels:
             if apart.channel == channel:

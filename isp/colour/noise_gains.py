@@ -66,18 +66,18 @@ def mean_snr(raw: RawImage, unit: str) -> tuple[float, float]:
 
 
 def colours_in_noise(raw: RawImage, fit: ColourFit, balance: WhiteBalance, unit: str, gains: NoiseGains) -> ColourFit:
-    """Add the error of a frame's planes to a fit's noise; a plain matrix is returned unchanged.
+    """Add the error of a processor's planes to the noise for which a fit's matrix is computed.
 
-    Each channel has one number per frame, because a matrix per pixel would flicker. The error is that of a grey scene
-    with the frame's mean in `unit`, relative to the signal of a surface that reflects all light, as in
-    `isp.colour.colour_fit.relative_noise`.
+    A fit with a plain matrix is returned unchanged. Each channel has one number per frame, because a matrix per pixel
+    would flicker. The error is that of a grey scene whose mean in `unit` is the frame's. It is relative to the signal
+    of a surface that reflects all light, as in `isp.colour.colour_fit.relative_noise`.
 
     Parameters
     ----------
     balance : WhiteBalance
         White balance whose given or calibrated response is that of a grey scene.
     unit : str
-        Channel whose electrons a neutral has in the developed picture.
+        Channel that sets the picture's scale: a neutral surface gets the electrons of this channel.
     """
     if fit.plain is not None:
         return fit

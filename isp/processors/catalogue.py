@@ -51,7 +51,8 @@ class Processor:
     colours : tuple of str
         Channels from which the matrix computes linear sRGB; empty for all channels of the mosaic.
     unit : str
-        Channel whose electrons a neutral has in the developed picture; empty for `sensor.cfa.unit_channel`.
+        Channel that sets the picture's scale: a neutral surface gets the electrons of this channel. It is empty for
+        `sensor.cfa.unit_channel`.
     on_backend : bool
         Whether it runs in Dr.Jit, if there is a backend, rather than in NumPy.
     noise_gains : NoiseGains or None

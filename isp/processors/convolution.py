@@ -18,10 +18,11 @@ def convolve(
     step: int = 1,
     run: Callable[[Callable[[int], None], Iterable[int]], Iterable[Any]] = map,
 ) -> Singles:
-    """Correlate (h, w, in) with a layer's filters (out, in, side, side) at all places where they fit into the array.
+    """Correlate an array (h, w, in) with a layer's filters (out, in, side, side), wherever they fit into the array.
 
-    Each row of a product's left matrix holds the values under one position of the filters. `run` is ``map``, or the
-    same method of a pool of threads; blocks and result don't depend on it.
+    The filters move by `step` pixels. For each block of rows, the values under each position of the filters become a
+    row of a matrix, which is multiplied by the filters. `run` calls a function for each block: it is ``map``, or the
+    ``map`` of a pool of threads. The blocks and the result are the same with either.
     """
     filters = filters.transpose(2, 3, 1, 0)
     side, _, seen, out = filters.shape

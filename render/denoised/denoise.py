@@ -23,7 +23,9 @@ LEAST_ALBEDO = 0.02  # smallest albedo that light is divided by; on darker surfa
 SURFACE_POINTS = 64
 SURFACE_THREADS = 1 << 20
 MIXING_PIXELS = 2.0  # standard deviation of the window that averages squared errors
-ROUNDING = 1e-10  # relative limit of the pseudo-inverse's singular values, which are squares of single precision
+# Singular values below this share of the largest one count as 0. They are squared, because the matrix is a product of
+# the light with its own transpose, and the light has single precision.
+ROUNDING = 1e-10
 _PLANES = 3  # planes that the denoiser takes in one call
 
 

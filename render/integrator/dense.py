@@ -330,7 +330,7 @@ class Tracer:
 
         Returns
         -------
-        received light, direction's sample, its weights, whether the BSDF chose by wavelength
+        received light, direction's sample, its weights, whether the sample depends on wavelength
         """
         mi = self.mi
         bsdf = si.bsdf(ray)
@@ -368,7 +368,8 @@ class Tracer:
 
         Returns
         -------
-        values towards the light, density of that direction, sample, its weights, whether the BSDF chose by wavelength
+        values towards the light, density of that direction, sample, its weights, whether the sample depends on
+        wavelength
         """
         if hasattr(bsdf, "scatter_bands"):
             values, pdf, sample, weights = bsdf.scatter_bands(si, towards_light, angle, wavelengths, self.table, step)
@@ -384,7 +385,7 @@ class Tracer:
     def _sampled(
         self, bsdf: Bsdf, si: Interaction, lobe: Float, angle: Point2, wavelengths: Spectra, step: UInt
     ) -> tuple[BsdfSample, Spectra, Mask]:
-        """Sample a BSDF only; return the sample, its weights, and whether the BSDF chose by wavelength."""
+        """Sample a BSDF only; return the sample, its weights, and whether the sample depends on wavelength."""
         if hasattr(bsdf, "sample_bands"):
             sample, weights = bsdf.sample_bands(si, angle, wavelengths, self.table, step)
             return sample, weights, dr.zeros(dr.mask_t(sample.pdf))

@@ -65,9 +65,10 @@ _LARGEST = 2**31 - 1  # of a rational's numerator and denominator
 
 
 def write_dng(raw: RawImage, path: Path, *, frame: int | None = None, written: datetime | None = None) -> Path:
-    """Write a digital negative; return its path. LibRaw and what is built on it open frames from 22 pixels per side on.
+    """Write a digital negative, and return its path.
 
-    BlackLevel is a whole number, because raw converters truncate fractions; `read_dng` restores the exact one.
+    LibRaw, and programs built on it, open frames whose sides have at least 22 pixels. BlackLevel is a whole number,
+    because raw converters truncate fractions; `read_dng` restores the exact one.
 
     Parameters
     ----------
@@ -76,7 +77,7 @@ def write_dng(raw: RawImage, path: Path, *, frame: int | None = None, written: d
     frame : int, optional
         Number of the exposure in a burst (ImageNumber).
     written : datetime, optional
-        What the file gives as its date; now, where left out.
+        Date that is written into the file; by default the present time.
 
     Raises
     ------

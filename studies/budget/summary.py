@@ -17,7 +17,7 @@ def summary(study: Study, plan: Plan, reference: Plan) -> tuple[str, ...]:
 
 def _paragraph(study: Study, plan: Plan, reference: Plan, scene: SceneChoice) -> str:
     rows = [row for row in plan.ledgers if row.condition.scene == scene]
-    sentences = [*_held(study, plan, scene), _left_out(rows), *_cost(study, rows)]
+    sentences = [*_rendered_with(study, plan, scene), _left_out(rows), *_cost(study, rows)]
     if scene in plan.renders:
         whole = reference.renders[scene]
         sentences.append(
@@ -28,8 +28,8 @@ def _paragraph(study: Study, plan: Plan, reference: Plan, scene: SceneChoice) ->
     return f"{scene.label}: {' '.join(sentences)}"
 
 
-def _held(study: Study, plan: Plan, scene: SceneChoice) -> list[str]:
-    """Say what the scene's render has."""
+def _rendered_with(study: Study, plan: Plan, scene: SceneChoice) -> list[str]:
+    """Say how many bands and samples per pixel the scene's render has, or that it keeps the picture file's bands."""
     automatic = study.budget.model == AUTOMATIC
     model = "the cheapest model within the budget" if automatic else f"the starting point {study.budget.model!r}"
     if scene not in plan.renders:

@@ -127,9 +127,9 @@ class RenderOrder:
 def render(order: Annotated[RenderOrder, Parameter(name="*")], *, dry_run: bool = False, json: bool = False) -> int:
     """Render a scene into a spectral OpenEXR file, and print its path.
 
-    Light of the scene that is there already, such as that of still_life which comes with rodcone, is taken as it is. A
-    render stops at whichever comes first of --spp, --noise and --max-seconds; with none of them after 64 samples per
-    pixel. Ctrl-C keeps what is done and exits with 130.
+    If the scene's light exists already, as for still_life, which comes with rodcone, it is used without a render. A
+    render stops when it first reaches --spp, --noise or --max-seconds. If none of them is given, it stops after 64
+    samples per pixel. Ctrl-C keeps what is done and exits with 130.
 
     Parameters
     ----------

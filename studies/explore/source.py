@@ -38,7 +38,7 @@ _SPP, _LEAST_BANDS = 64, 4
 
 @dataclass(frozen=True)
 class RenderState:
-    """One state of the render: its transport, the Python that makes it, and whether a finer one follows."""
+    """One state of the render: its transport, the Python that makes it, and whether it is the last, finest one."""
 
     transport: Transport
     code: str
@@ -120,7 +120,7 @@ def open_source(source: str, options: RenderOptions) -> Source:
     if is_radiance_file(source):
         check_radiance_file(source, ())
         require_memory(memory(*extent_of(source)), options.force)
-        # The illuminant of an ISETCam scene isn't used, because the page names lights and it has no name.
+        # An ISETCam scene's own illuminant has no name, and the page can only show lights by name: it isn't used.
         transport, notes = open_radiance_file(source, default_white(source))
         transport = _with_its_light(transport, source)
         code = f"transport = rodcone.load_transport({source!r})\n"

@@ -47,9 +47,10 @@ class Pair:
 
 
 def answer(pair: Pair) -> str:
-    """Say in words how the first of a pair does beside the second: a sentence for each run of levels of one verdict.
+    """Say in words whether the first of a pair is better than the second.
 
-    Every difference in `HEADLINE` as large as a person sees is in it, losses as well as gains.
+    Neighbouring levels with the same verdict share one sentence. It mentions every difference in a `HEADLINE` metric
+    that a person can see, losses as well as gains.
     """
     by_metric, levels = pair.leads, pair.levels
     if pair.ours[PSNR.key].shape[-1] == 1:

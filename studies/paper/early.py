@@ -65,7 +65,7 @@ def range_db(sensor: SensorConfig) -> tuple[float, float]:
 def colour_noise(reading: str, processor: str, luminance_cd_m2: float) -> tuple[float, float]:
     """Return the colour noise of an even grey field, in closed form and as measured on frames that are read out.
 
-    It is the standard deviation of linear sRGB about its own luminance, in which the grey is 1.
+    It is the standard deviation of linear sRGB after its luminance is subtracted. The grey has the value 1.
     """
     sensor = Camera(reading, processor).sensor
     light = named_light("D65")

@@ -175,10 +175,10 @@ def _parts(shares: Floats | None, count: int) -> float | Floats:
 
 
 def _with(mean: Transport, each: Transport, count: int, parts: float | Floats) -> Transport:
-    """Return the mean over `count` times, from the mean m over all but the last one, and the last one x.
+    """Update a mean over times by one more time: x is the light at this time, m the mean over all times before it.
 
-    With k = `count`, it is m + (x - m) / k, and the variance of independent errors is ((k - 1)^2 v_m + v_x) / k^2.
-    Arrays with rows have the `parts` from `_parts` in place of k.
+    With k = `count`, the number of times including the new one, the mean is m + (x - m) / k. Its variance is
+    ((k - 1)^2 v_m + v_x) / k^2, because the errors are independent. Arrays with rows use `parts`, from `_parts`, for k.
     """
 
     def mixed(first: Any, last: Any, k: float | Floats = count) -> Any:
@@ -186,8 +186,8 @@ def _with(mean: Transport, each: Transport, count: int, parts: float | Floats) -
 
     def of_errors(first: Any, last: Any, k: float | Floats = count) -> Any:
         real = np.asarray(first).dtype
-        rest = np.asarray(1 / np.asarray(k, np.float64))
-        return first * ((1 - rest) ** 2).astype(real) + last * (rest**2).astype(real)
+        newest = np.asarray(1 / np.asarray(k, np.float64))
+        return first * ((1 - newest) ** 2).astype(real) + last * (newest**2).astype(real)
 
     def halves(first: Halves, last: Halves) -> Halves:
         return Halves(mixed(first.mean, last.mean, parts), mixed(first.difference, last.difference, parts))

@@ -481,7 +481,8 @@ def _frames(
 def _exposure(checked: Checked, per_second_e: NDArray[np.float64]) -> tuple[float, SensorConfig]:
     """Return the exposure time [s], given or chosen by a rule, and the camera at the gain that it then has.
 
-    A rule meters the mean over time of lamps that flicker, and cuts its time to whole periods of theirs.
+    For lamps that flicker, a rule meters their mean light, and the exposure time is shortened to a whole number of the
+    lamps' periods.
     """
     if checked.exposure_s is not None:
         return checked.exposure_s, checked.sensor
@@ -642,7 +643,9 @@ def check(order: Order) -> Checked:
         after_s,
         through=through,
         times=times,
-        light_arrays=_light_arrays(order, sensor, _held(prod(rendered), centres.size, len(opened.scene.groups))),
+        light_arrays=_light_arrays(
+            order, sensor, _arrays_while_imaged(prod(rendered), centres.size, len(opened.scene.groups))
+        ),
         band_s=band_s,
     )
     return Checked(order, sensor, opened, exposure_s, ready, samples, cost, flicker, moving, shares)
@@ -653,18 +656,17 @@ def _lies_in_files(light_bytes: float) -> bool:
     return light_bytes > _MOST_HELD_BYTES
 
 
-def _held(pixels: int, bands: int, groups: int) -> int:
+def _arrays_while_imaged(pixels: int, bands: int, groups: int) -> int:
     """Return how many arrays of a render's light, with all bands, are in memory while it is imaged."""
     return 0 if _lies_in_files(4.0 * pixels * bands * groups) else _HALVES
 
 
-def _light_arrays(order: Order, sensor: SensorConfig, held: int) -> int | None:
-    """Return how many arrays of the light, with all bands, are in memory while bands are imaged one at a time.
+def _light_arrays(order: Order, sensor: SensorConfig, arrays: int) -> int | None:
+    """Return `arrays`, the number of all-band arrays in memory, if bands are imaged one at a time; otherwise None.
 
-    None stands for light whose bands are imaged together: behind a lens that doesn't spread light, or from lamps that
-    flicker.
+    Bands are imaged together behind a lens that doesn't spread light, and under lamps that flicker.
     """
-    return held if spreads(sensor.lens) and not order.flicker else None
+    return arrays if spreads(sensor.lens) and not order.flicker else None
 
 
 def _after_s(sensor: SensorConfig) -> tuple[float, float]:

@@ -114,7 +114,7 @@ def bands_of(light: str, window_nm: tuple[float, float]) -> Light:
 
 
 def _edge_electrons(sensor: SensorConfig, bands: Light, exposure_s: float) -> Floats:
-    """Return an edge's expected photo-electrons, the bright side at a share of the well."""
+    """Return an edge's expected photo-electrons by photodiode; the brightest has `BRIGHT_SHARE` of its well."""
     samples = least_samples(sensor)
     radiance = grey_radiance(edge_reflectance(SIDE_PX * sensor.sites * samples), bands)
     electrons = expected_electrons(form_image(radiance, sensor, samples), sensor, exposure_s)

@@ -45,7 +45,7 @@ PAPER_METHOD = "interleaved_paper"  # the processor whose published method inclu
 _LISTS = ("scenes", "spectra", "levels", "exposures", "sensors", "white_balances", "processors", "frames", "seeds")
 _GAINS = ("gains", "isos")
 SPP = 1, 1 << 16, "give samples per pixel"
-# What a study's pictures model: the cheapest model within the budget, or one of three starting points.
+# Which effects a study's pictures include: those of the cheapest model within the budget, or of a starting point.
 AUTOMATIC = "automatic"
 STARTING_POINTS = FAST, DEFAULT, REFERENCE = "fast", "default", "reference"
 FILES = (".xml", ".toml", *CURVES, *ENDINGS)  # endings of values that name a file

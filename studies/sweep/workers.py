@@ -142,7 +142,10 @@ def _limit_threads(most: int) -> None:
 
 
 def _take(waiting: dict[Hashable, deque[Task]], running: Iterable[Task]) -> Task:
-    """Take the next cell, of a kind of which none runs, so that a worker goes on with the kind that it has just had."""
+    """Take the next cell, from a kind that no worker computes now, or from the first kind if all are being computed.
+
+    So a worker goes on with the kind that it has just finished, and keeps what it has prepared for it.
+    """
     busy = {cell.kind for cell in running}
     kind = next((kind for kind in waiting if kind not in busy), next(iter(waiting)))
     cell = waiting[kind].popleft()

@@ -193,7 +193,12 @@ def _lamp(white: list[Float], light: Float, contrast: Float, chi_squared: Float)
 
 
 def _own_light(sample: Float, share: Float, of_white: Float, noise: tuple[Float, Float]) -> Float:
-    """Estimate what W would read from the pixel's own sample, as far as that differs from W's plane."""
+    """Estimate W at a pixel from the pixel's own sample, in the colour around it.
+
+    A sample of another channel becomes W when it is divided by `share`, that channel's electrons per electron of W. The
+    result lies between W's plane (`of_white`) and this value: the clearer the two differ beside noise, the nearer to
+    the sample.
+    """
     shot, dark = noise
     as_white_noise = larger((shot * larger(of_white, 0.0) + dark / share) / share, TINY)
     difference = sample / share - of_white
