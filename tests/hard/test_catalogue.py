@@ -30,6 +30,7 @@ def marks(name):
 
 
 @needs_kernel
+@pytest.mark.filterwarnings("ignore:crosstalk. 0.25 isn't undone")
 @pytest.mark.parametrize("case", [pytest.param(case, id=case.name, marks=marks(case.name)) for case in CASES])
 def test_a_hard_case_keeps_its_invariants_but_for_exactly_its_known_limits(case):
     assert unexpected(run_case(case)) == []
