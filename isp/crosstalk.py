@@ -55,7 +55,7 @@ def without_crosstalk(raw: RawImage, neutral: Floats) -> RawImage:
     if not is_undone(raw.crosstalk):
         if raw.crosstalk:
             warnings.warn(
-                f"crosstalk: {raw.crosstalk:g} isn't undone: edges look pale; allowed: up to {MOST_UNDONE:g}; give less",
+                f"crosstalk: {raw.crosstalk:g} isn't undone: edges look pale; allowed: {MOST_UNDONE:g} or less",
                 UserWarning,
                 stacklevel=3,
             )
