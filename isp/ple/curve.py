@@ -1,7 +1,10 @@
-"""Patches under black: a component knows readings along a line in the root u of a signal, which falls under black.
+"""Patches whose linear estimate falls below black are estimated again, on the curve that their samples really follow.
 
-Samples read t(m g u^2), a curve. Each sample, and the pilot, is moved by the line less the curve at the last estimate
-of u, 0 or more: there the line is right. After `ROUNDS` the patch is t at the last u.
+A component's estimate assumes that mean readings t lie on a straight line in the root u of the signal
+(`isp.ple.tables`). In the dark this line falls below the reading of no light, whereas the true readings t(m g u^2) lie
+on a curve that ends there. Therefore each sample, and the pilot, is moved by the line minus the curve at the last
+estimate of u (0 if that is negative). At this u the line is then right, and the linear estimate is computed anew. After
+`ROUNDS` such rounds the result is t at the last u.
 """
 
 from functools import lru_cache
@@ -15,27 +18,29 @@ from isp.ple.units import readings
 from rodcone.types import Singles
 
 ROUNDS = 4
-TOGETHER = 100  # patches, so that arrays are small ones to malloc: others are fresh memory each time
+TOGETHER = 100  # patches estimated together: few, because malloc fetches fresh memory for each large array
 
 
 def on_the_curve(
     components: Table, component: NDArray[np.int16], evidence: Singles, noise: Singles, straight: Singles
 ) -> Singles:
-    """Bring estimates of patches to the curve of their readings.
+    """Estimate patches anew, so that the estimates lie on the curve of readings.
 
     Parameters
     ----------
     components : Table
+        Components at the patches' light.
     component : (patch,) int16
-        Sorted.
+        Number of each patch's component, sorted.
     evidence, noise : as for `isp.ple.pick.pick`
+        With a pilot.
     straight : (patch, value) float32
         Estimates by `Estimator.linear`; it is overwritten.
 
     Returns
     -------
     (patch, value) float32
-        Over black, times the window.
+        Mean readings minus those of black, times the window.
     """
     taper, dark_e = components.taper, components.sampling.dark_e
     average = components.average.T.astype(np.float32)
@@ -58,9 +63,10 @@ def on_the_curve(
 
 
 def over_black(roots: Singles, dark_e: tuple[float, ...]) -> Singles:
-    """Return mean readings less those of black, from twice the roots of expected electrons, channels in turn.
+    """Compute mean readings minus those of black, from twice the roots of expected electrons.
 
-    A negative root counts as 0. The result overwrites `roots`.
+    The columns of `roots` belong to the channels in turn, whose dark noises are `dark_e`. A negative root counts as 0.
+    The result overwrites `roots`.
     """
     bases, steps, firsts, offsets = _side_by_side(dark_e, roots.shape[1] // len(dark_e))
     # clip is three times as fast as minimum and maximum
@@ -77,9 +83,10 @@ def over_black(roots: Singles, dark_e: tuple[float, ...]) -> Singles:
 
 @lru_cache(maxsize=256)
 def _side_by_side(dark_e: tuple[float, ...], repeats: int) -> tuple[Singles, ...]:
-    """Return what `over_black` needs for each value, and all steps of `Readings.offset` less black.
+    """Return three constants per value of a patch for `over_black`, and the curves `Readings.offset` minus black.
 
-    For each value that is 4 d^2 + 1/2, the number of steps per unit of twice a root, and its channel's first step.
+    The constants are 4 d^2 + 1/2 (d as in `isp.ple.units`), the number of the curve's steps per unit of twice a root,
+    and the index of the first step of the value's channel, plus 1/2 for rounding. `repeats` is the number of pixels.
     """
     curves = [readings(noise_e) for noise_e in dark_e]
     black = np.array([curve.mean(np.zeros(1))[0] for curve in curves])

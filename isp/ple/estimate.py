@@ -1,4 +1,4 @@
-"""One scale: each patch picks a component and takes its estimate, and overlapping patches are averaged.
+"""Estimation of one scale: each patch by the component that fits it best, then the mean of overlapping patches.
 
 The estimate X of a pixel is a weighted mean of the estimates x_p by all patches p that cover it,
 
@@ -36,13 +36,13 @@ from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Table, table, window
 from rodcone.types import Singles
 
 TOGETHER = 8000  # patches that are estimated together
-LEAST_LIGHT = 1e-3  # electrons
-COARSE_STEPS = 2  # of light from table to table at coarse scales, which need no finer ones
-DOUBT = 2.0  # power by which a patch that its component explains badly counts less
-INFLATE = 2.0  # of the pilot's variance: it has seen the same samples
-LEAST_VARIANCE = 0.02  # of an estimate, beside its posterior one [units of noise^2]
-# Values of some patches, (patch, value) float32, every channel at every pixel times window and weight; and the tables
-# that they were made by.
+LEAST_LIGHT = 1e-3  # least light of a patch [e- of white in G]
+COARSE_STEPS = 2  # steps of light between two tables of a coarse scale, which needs no finer ones
+DOUBT = 2.0  # power of the misfit by which the weight of a patch is divided
+INFLATE = 2.0  # factor on the pilot's variance, because the pilot was computed from the same samples
+LEAST_VARIANCE = 0.02  # added to an estimate's posterior variance [units of noise^2]
+# Values of some patches, (patch, value) float32: every channel at every pixel, times window and weight. With them, the
+# tables from which they were computed.
 Solved: TypeAlias = tuple[Singles, list[Table]]
 
 
@@ -54,13 +54,13 @@ class Scale:
     ----------
     shape : (h, w)
     samples : (h + border, w + border) or (h + border, w + border, channel) float32
-        In units of noise, continued beyond the frame by `border`.
+        Samples [units of noise], continued beyond the frame by `isp.ple.overlap.border`.
     full : like `samples`, bool
-        W's saturated samples: only lower bounds.
+        Which samples are saturated Ws, so that they are only lower bounds.
     samplings : tuple of tuple of Sampling
-        Of the first patches' rows and columns; those of the others repeat them.
+        Samplings of the patches in the first rows and columns; those of the other patches repeat them.
     columns : (sample,) intp or None
-        Which numbers of a patch are samples, in the order of the samplings' rows; None: all.
+        Which of a patch's numbers in `samples` are samples, in the order of `Sampling.rows`; None if all are.
     """
 
     shape: tuple[int, int]
@@ -77,14 +77,14 @@ class Scale:
 
 @dataclass(frozen=True)
 class PatchPilot:
-    """What a coarser scale says of each patch.
+    """A coarser scale's estimate of each patch's means.
 
     Attributes
     ----------
     means : (ny, nx, 4) float32
-        Of the patch, by channel [units of noise].
+        Mean over the patch, per channel [units of noise].
     variance : (ny, nx) float32
-        Of these means.
+        Variance of these means.
     """
 
     means: Singles
@@ -99,9 +99,9 @@ class LitPatches:
     ----------
     sampling : Sampling
     step : int
-        Of light, in powers of `STEP`.
+        Step of light: the patches' light is about ``STEP ** step``.
     index : (patch,) intp
-        Which of the scale's patches they are, counted row by row.
+        Numbers of the patches, counted row by row over the scale.
     last : bool
         Whether no other patches of this sampling and light follow.
     """
@@ -120,14 +120,16 @@ class LitPatches:
 
 @dataclass(frozen=True)
 class Patches:
-    """What is known of some patches beside their values.
+    """Weights and posterior variances of patches.
 
     Attributes
     ----------
     weight : (patch,) float32
-        w of the formula above.
-    inner, noise : (patch, 4) float32
-        By channel: posterior variance of the mean of the patch's middle, and of a pixel over a sample's noise.
+        w_p of the module's formula.
+    inner : (patch, 4) float32
+        Posterior variance of the mean over the patch's middle half, per channel.
+    noise : (patch, 4) float32
+        Posterior variance of a pixel over the variance of a sample's noise, per channel.
     """
 
     weight: Singles
@@ -142,11 +144,11 @@ class ScaleEstimate:
     Attributes
     ----------
     planes : (h, w, 4) float32
-        In units of noise.
+        Estimates [units of noise].
     variance : (h/2, w/2, 4) float32
-        Posterior variance of the mean over the middle half of a patch, mean over the patches.
+        Posterior variance of the mean over a patch's middle half, averaged over the patches that cover each 2x2 pixels.
     noise : (4,) float64
-        Posterior variance of a pixel over the noise of a sample, median over the patches.
+        Posterior variance of a pixel over the variance of a sample's noise, the median over the patches.
     """
 
     planes: Singles
@@ -162,7 +164,7 @@ def estimate(prior: Prior, scale: Scale, light: Singles, pilot: PatchPilot | Non
     prior : Prior
     scale : Scale
     light : (ny, nx) float32
-        Of each patch [e- of white in G].
+        Light of each patch [e- of white in G].
     pilot : PatchPilot or None
     """
     size = scale.samplings[0][0].size
@@ -173,11 +175,11 @@ def estimate(prior: Prior, scale: Scale, light: Singles, pilot: PatchPilot | Non
     total = np.zeros(((ny - 1) * STRIDE + size, (nx - 1) * STRIDE + size, 4), np.float32)
     patches = Patches(*(np.empty((ny * nx, *width), np.float32) for width in ((), (4,), (4,))))
     with one_thread(), ThreadPoolExecutor(cpu_count()) as threads:
-        # Tables first, each once: parts of a group would make the same one at the same time.
+        # Tables are made before, each once, because the parts of a group would make the same one at the same time.
         list(threads.map(lambda group: table(prior, group.sampling, group.step), groups))
         parts = [part for group in groups for part in group.parts()]
         using = set[Table]()
-        # Sums run in the order of the parts: the result doesn't depend on threads.
+        # Patches are added in the order of the parts, so that the result doesn't depend on the threads.
         for part, (values, tables) in zip(
             parts, _in_turn(threads, lambda part: _solve(prior, part, scale, pilot, patches), parts), strict=True
         ):
@@ -220,7 +222,7 @@ def _groups(samplings: tuple[tuple[Sampling, ...], ...], steps: NDArray[np.int16
     for number, sampling in enumerate(distinct):
         among = np.flatnonzero(order == number)
         own_steps = steps.ravel()[among]
-        among = among[np.argsort(own_steps, kind="stable")]  # of int16: a radix sort
+        among = among[np.argsort(own_steps, kind="stable")]  # a radix sort, because these are int16
         own_steps = np.sort(own_steps, kind="stable")
         bounds = np.flatnonzero(np.diff(own_steps, prepend=-(1 << 15), append=-(1 << 15))).tolist()
         groups += [LitPatches(sampling, int(own_steps[a]), among[a:b]) for a, b in pairwise(bounds)]
@@ -267,8 +269,8 @@ def _samples(values: NDArray[Any], scale: Scale, index: NDArray[np.intp]) -> NDA
 def _solve_one_light(components: Table, y: Singles, pilot: PatchPilot | None) -> tuple[Singles, Patches]:
     """Estimate patches whose samples are y from the prior's components at one light.
 
-    With i_d the pilot's innovation in direction d (`Whitening.reads`), s_d its variance without the pilot's own noise
-    n, and c_d its covariance with the patch's values,
+    Let i_d be the pilot's innovation in direction d (`Whitening.reads`), s_d its variance without the pilot's own noise
+    n, and c_d its covariance with the patch's values. With t and C of `isp.ple.tables`, estimate and variance are
 
         x = t + C_xy C_yy^-1 (y - t_y) + sum_d c_d i_d / (n + s_d),   v = v_y - sum_d c_d^2 / (n + s_d),
 
@@ -279,7 +281,7 @@ def _solve_one_light(components: Table, y: Singles, pilot: PatchPilot | None) ->
     patches = Patches(*(np.empty((count, *width), np.float32) for width in ((), (4,), (4,))))
     # Patches whose linear estimate falls under black: `on_the_curve` estimates them again.
     below = [np.empty(0, np.intp)]
-    # What the table's matrices take: samples, 1, the pilot's means.
+    # The table's matrices are applied to the samples, the number 1 and the pilot's means.
     own = y.shape[1]
     evidence = np.empty((count, own + 1 if pilot is None else own + 5), np.float32)
     evidence[:, :own], evidence[:, own] = y, 1.0
@@ -304,19 +306,19 @@ def _solve_one_light(components: Table, y: Singles, pilot: PatchPilot | None) ->
                     estimator.variance - precision @ estimator.pilot_variance,
                     estimator.inner - precision @ estimator.pilot_inner,
                 )
-                # The pilot's means p give way to i_d / (n + s_d), the precision times the innovation.
+                # The pilot's means p are replaced by i_d / (n + s_d), the innovations times their precisions.
                 rows[:, -4:] = rows @ whitening.reads[:, -4:] * precision
-            # A patch that no component explains has a larger posterior variance, by `doubt`.
+            # If no component explains a patch, its posterior variance is larger by the factor `doubt`.
             doubt = np.maximum(misfit[group], 1.0) ** DOUBT
             weight = (1.0 / (doubt * (variance.mean(axis=-1) + LEAST_VARIANCE))).astype(np.float32)
             rows *= weight[:, None]
             weighted = np.matmul(rows, linear, out=made[: group.size])
             if noise is not None and components.mix.size == PATCH:
-                below.append(group[(weighted < 0.0).any(axis=1)])  # the finest scale: its output is seen
+                below.append(group[(weighted < 0.0).any(axis=1)])  # only at the finest scale, which becomes the picture
             patches.weight[group] = weight
             patches.inner[group] = doubt[:, None] * np.maximum(inner, 0.0)
             patches.noise[group] = variance * (estimator.noise / estimator.variance)
-            values[group] = weighted  # times the window, which `linear` holds
+            values[group] = weighted  # with the window, which `linear` includes
     if noise is not None:
         for group in blocks(np.concatenate(below), CURVED_TOGETHER):
             weight = patches.weight[group, None]

@@ -1,17 +1,17 @@
 """Grey lines two pixels apart, which a mosaic of 2x2 pixels reads as a colour.
 
-Every channel of such a mosaic samples the same phase of these lines, so that red, say, sees bright ones alone and blue
-dark ones alone. The trained Gaussians hold next to no such lines and take them for an even surface, yellow or violet.
-Two Gaussians more stand for them, upright ones with s(p) = (-1)^x and lying ones with s(p) = (-1)^y. The roots of
-signal of a pixel p of channel c are
+Each channel of such a mosaic samples only one phase of these lines, so that red, for example, sees only bright lines
+and blue only dark ones. The trained Gaussians contain hardly any such lines, and explain them by an even surface,
+yellow or violet. Therefore two more Gaussians model them: upright lines with s(p) = (-1)^x, and lying ones with
+s(p) = (-1)^y. At pixel p = (x, y), channel c has the root of signal
 
     u_c(p) = MEAN + a(p) + s(p) b(p) + q_c,
 
-where a is what is even, b the lines' contrast, both Gaussian processes that change over some pixels, and q_c the little
-colour that grey things have. Coarser scales take the lines for a colour as well, so that what they say counts for
-nothing (`isp.ple.tables`). Only patches that are coloured in the way that lines would be are held against these two.
-Lines that are exactly even over a whole patch fit an even surface as well, if W is full or a lamp of that hue is
-thinkable, and stay coloured.
+where a is the part without lines, b the contrast of the lines, and q_c the slight colour of grey things; a and b are
+Gaussian processes, which vary over some pixels. Coarser scales see the lines as a colour too. For these two Gaussians
+the pilot therefore counts for nothing (`isp.ple.tables`). Both are tried only for patches of a colour that lines would
+have. Lines of exactly the same contrast over a whole patch stay coloured if W is full or if a lamp of that hue is
+possible, because an even surface then explains them equally well.
 """
 
 from dataclasses import replace
@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 from isp.ple.prior import Mixture
 from rodcone.types import Floats
 
-WEIGHT = 3e-5  # of each; of a coloured surface the trained ones know much better what is likely
-MEAN = 0.9  # root of a patch's own mean light is 1
+WEIGHT = 3e-5  # weight of each: small, because the trained Gaussians know better which coloured surfaces are likely
+MEAN = 0.9  # mean root of signal; the root of a patch's mean light is 1
 EVEN, EVEN_PX = 0.3, 5.0  # standard deviation and length of a
-CONTRAST, CONTRAST_PX = 0.6, 2.5  # of b; shorter: lines that aren't quite two pixels apart count too
-GREY = 0.015  # standard deviation of q_c; more, and yellow or pale blue things become striped
-REST, REST_OF_CHANNEL = 1e-4, 1e-5  # variance of each pixel beside these, of all channels alike and of each alone
-LEAST_ALIASED = 0.05  # of a patch's mean: the difference between its channels from which it may be lines
+CONTRAST, CONTRAST_PX = 0.6, 2.5  # the same of b; so short that lines not quite two pixels apart are included
+GREY = 0.015  # standard deviation of q_c; with a larger one, yellow or pale blue things become striped
+REST, REST_OF_CHANNEL = 1e-4, 1e-5  # further variance of each pixel: common to its channels, and of each channel alone
+LEAST_ALIASED = 0.05  # least stripes that the means of a patch's channels must show, as a share of them, to try lines
 
 
 def signs(size: int) -> Floats:
@@ -40,7 +40,7 @@ def signs(size: int) -> Floats:
 
 @cache
 def with_fine_lines(mix: Mixture) -> Mixture:
-    """Return a mixture with two Gaussians more, of fine lines, which come last."""
+    """Append two Gaussians of fine lines, upright and lying ones, to a mixture."""
     y, x = np.indices((mix.size, mix.size)).reshape(2, -1)
     square_px2 = (x[:, None] - x) ** 2.0 + (y[:, None] - y) ** 2.0
 
@@ -61,14 +61,14 @@ def with_fine_lines(mix: Mixture) -> Mixture:
 
 
 def aliased(rows: NDArray[np.intp], size: int) -> Floats:
-    """Return the mean of s(p) over each channel's samples, shape (2, 4): what lines of contrast 1 read as a colour.
+    """Return the mean of s(p) over each channel's samples, shape (2, 4): the colour that lines of contrast 1 show.
 
     Parameters
     ----------
     rows : (sample,) intp
         Places of the samples in a patch's vector, 4 * pixel + channel.
     size : int
-        Pixels a side of the patch.
+        Side of the patch [pixels].
     """
     counts = np.maximum(np.bincount(rows % 4, minlength=4), 1)
     return np.stack([np.bincount(rows % 4, s[rows // 4], 4) / counts for s in signs(size)])

@@ -1,4 +1,4 @@
-"""A mosaic for piecewise linear estimation: sums of samples over cells, channels of a patch, reflection at the frame.
+"""Preparation of a mosaic for piecewise linear estimation: sums over cells, samplings, and reflection at the frame.
 
 Patches lie two pixels apart. In a tile of four pixels they begin at its first or third pixel, which are the tile's
 *phases*; the channels of a patch's samples, its sampling, depend on the phase. Cells of 2x2 pixels may lack channels
@@ -22,10 +22,10 @@ from rodcone.types import Singles
 from sensor.cfa import Tile, channel_map, channels, mask
 from sensor.raw import RawImage
 
-SIDES = (1, 2, 4)  # of a tile [pixels]
-SCALES = 4  # levels of the pyramid above single pixels
-CELLS = 4  # a side of a coarse patch
-LEAST_CELLS = 5  # a side of the coarsest scale
+SIDES = (1, 2, 4)  # heights and widths that a tile may have [pixels]
+SCALES = 4  # largest number of levels of the pyramid above single pixels
+CELLS = 4  # side of a coarse scale's patches [cells]
+LEAST_CELLS = 5  # least side of the coarsest scale [cells]
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,13 @@ class Cells:
     electrons : (h, w, channel) float32
         Of the mosaic's channels [e-]; 0 where a cell has no sample of a channel.
     full : (h, w, channel) bool
-        Where a saturated W is in the sum: of W beside G, which is full long after.
+        Whether the sum includes a saturated W (`full_white`).
     presence : (row, column, channel) bool
-        Which channels the first cells hold; periodic.
+        Which channels the cells of the first tile contain; the other cells repeat them.
     sampling : Sampling
-        Of patches of 4x4 cells.
+        Sampling of patches of 4x4 cells.
     index : tuple of int
-        Places of the mosaic's channels among R, G, B and W.
+        Indices of the mosaic's channels among R, G, B and W.
     """
 
     electrons: Singles
@@ -62,7 +62,7 @@ def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray
     white_e : (4,) array_like
         Electrons that R, G, B and W collect from a white surface, relative to G.
     electrons : (h, w) float32
-        `site_electrons` of the raw image; ``white_e`` is divided by the same factor.
+        `site_electrons` of the raw image, which are divided by k of `counted_noise`; so is ``white_e``.
     full : (h, w) bool
         `full_white` of the raw image.
     """
@@ -71,8 +71,8 @@ def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray
     down, across = (lcm(side, 2) // 2 for side in (len(raw.cfa), len(raw.cfa[0])))
     letters = channel_map(raw.cfa, (2 * down, 2 * across)).reshape(down, 2, across, 2)
     tally = np.stack([(letters == name).sum(axis=(1, 3)) for name in names], axis=-1)
-    # One `Sampling` serves all patches only if every cell sums as many samples of a channel: as many as the cell with
-    # the fewest of those that have any. sums[1] holds the surplus, for the larger cells.
+    # One `Sampling` serves all patches only if all cells sum equally many samples of a channel. That number is the one
+    # of the cell with the fewest, among cells with any. sums[1] holds the surplus samples, for the larger cells.
     fewest = np.where(tally > 0, tally, 4).min(axis=(0, 1))
     height, width = (length // 2 for length in raw.shape)
     shape = (1 + int(np.any(tally > fewest)), height, width, len(names))
@@ -122,8 +122,8 @@ def _first_patch(presence: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _sampling(
     raw: RawImage, white_e: ArrayLike, counts: NDArray[np.float64], size: int, rows: tuple[int, ...]
 ) -> Sampling:
-    # Tables are kept by these numbers: in six digits, exposures of different times share them. PRNU stays that of one
-    # sample, though independent gains even out in a sum: coarse cells are read as a little noisier than they are.
+    # Tables are kept under these numbers, which have six digits so that exposures of different times share tables. PRNU
+    # stays that of one sample, although independent gains even out in a sum: coarse cells count as a little too noisy.
     gains, dark_e = (
         tuple(float(f"{value:.6g}") for value in values)
         for values in (np.asarray(white_e) * counts, counted_noise(raw)[1] * np.sqrt(counts))
@@ -134,14 +134,15 @@ def _sampling(
 def counted_noise(raw: RawImage) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the noise of R, G, B and W: the variance k per electron of light, and the dark noise in counted electrons.
 
-    k is 1 for a sample that counts every electron for which it stands.
+    Counted electrons are a sample's electrons divided by k, so that their shot noise is Poisson's. k is 1 unless a
+    sample was scaled, because its reading had only a share of the light or of the time.
     """
     noise = [raw.noise_of(name) for name in LETTERS]
     return np.array([x.shot for x in noise]), np.array([x.dark_noise_e / x.shot for x in noise])
 
 
 def site_electrons(raw: RawImage) -> Singles:
-    """Return the electrons that a mosaic's sites count, (h, w) float32, of Poisson's noise: the image's over k."""
+    """Return the counted electrons of a mosaic's sites (`counted_noise`), (h, w) float32."""
     electrons = raw.electrons.astype(np.float32)
     counted = electrons / np.float32(raw.plain_noise.shot)
     for noise in (raw.noise_of(apart.channel) for apart in raw.channel_noise):
@@ -156,7 +157,7 @@ def full_white(raw: RawImage) -> NDArray[np.bool_]:
 
 
 def scale_of_cells(cells: Cells) -> Scale:
-    """Convert sums over cells to units of noise, as `isp.ple.estimate` takes them."""
+    """Convert sums over cells to units of noise, for `isp.ple.estimate`."""
     stable = [
         transform(plane, cells.sampling.dark_e[channel])
         for plane, channel in zip(np.moveaxis(cells.electrons, -1, 0), cells.index, strict=True)
@@ -172,9 +173,9 @@ def scale_of_cells(cells: Cells) -> Scale:
 
 
 def scale_of_pixels(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray[np.bool_]) -> Scale:
-    """Convert samples to units of noise, with a sampling for each phase of the tile; parameters as `pyramid`."""
+    """Convert samples to units of noise, with a sampling for each phase of the tile; parameters as in `pyramid`."""
     down, across = (len(raw.cfa), len(raw.cfa[0]))
-    beyond = PATCH - STRIDE  # pixels of the first patch that lie before the frame
+    beyond = PATCH - STRIDE  # rows and columns of the first patch that lie outside the frame
     samplings = tuple(
         tuple(
             _sampling(raw, white_e, np.ones(4), PATCH, _sites(raw.cfa, top - beyond, left - beyond))
@@ -183,7 +184,7 @@ def scale_of_pixels(raw: RawImage, white_e: ArrayLike, electrons: Singles, full:
         for top in range(0, lcm(down, STRIDE), STRIDE)
     )
     plain = raw.plain_noise
-    samples = transform(electrons, float(plain.dark_noise_e / plain.shot))  # of NumPy, it would make them float64
+    samples = transform(electrons, float(plain.dark_noise_e / plain.shot))  # NumPy's own float would make them float64
     for noise in (raw.noise_of(apart.channel) for apart in raw.channel_noise):
         at = mask(raw.cfa, noise.channel, raw.shape)
         samples[at] = transform(electrons[at], noise.dark_noise_e / noise.shot)

@@ -1,4 +1,4 @@
-"""Patches that overlap: where they lie, beyond the frame too, and their weighted sums."""
+"""Overlapping patches: their places, which reach beyond the frame, and their weighted sums."""
 
 from itertools import pairwise
 from typing import Any
@@ -12,11 +12,11 @@ from isp.strips import strips
 from rodcone.types import Singles
 
 STRIDE = 2  # pixels from patch to patch
-ROWS = 64  # of patches whose weights are summed together
+ROWS = 64  # rows of patches whose weights are summed together
 
 
 def border(length: int, size: int) -> tuple[int, int]:
-    """Return how many samples to add before and behind a line, so that all its samples lie in equally many patches."""
+    """Return how many samples to add at either end of a line, so that all its samples lie in equally many patches."""
     return size - STRIDE, (length - 1) // STRIDE * STRIDE + size - length
 
 
@@ -32,22 +32,23 @@ def gather(values: NDArray[Any], index: NDArray[np.intp], size: int) -> NDArray[
     Parameters
     ----------
     values : array
-        C-contiguous; every pixel of it lies in a patch.
+        C-contiguous array, whose every pixel lies in a patch.
     index : (patch,) intp
-        Which patches, counted row by row.
+        Numbers of the patches to return, counted row by row.
     size : int
-        Pixels a side of a patch.
+        Side of a patch [pixels].
     """
     lines = _lines(values, size)
     return lines[_places(values, index, size)].view(values.dtype).reshape(len(index), -1)
 
 
 def add_patches(total: Singles, values: Singles, index: NDArray[np.intp], size: int) -> None:
-    """Add patches to the sums of a frame; `total` (h, w, 4) and `index` as `gather` has them."""
+    """Add patches to the sums of a frame, `total` (h, w, 4); `index` and `size` are those of `gather`."""
     lines, across = _lines(total, size), size // STRIDE
     places = _places(total, index, size)
     nx = (total.shape[1] - size) // STRIDE + 1
-    # Patches whose rows and columns leave the same rest don't overlap: of these each sum takes one at the most.
+    # Patches whose row and column leave the same remainders after division by `across` don't overlap. They are added at
+    # once, because each pixel lies in at most one of them.
     rest = (index // nx % across * across + index % nx % across).astype(np.int8)
     order = np.argsort(rest, kind="stable")
     for first, last in pairwise(np.searchsorted(rest[order], np.arange(across**2 + 1))):
@@ -59,7 +60,7 @@ def add_patches(total: Singles, values: Singles, index: NDArray[np.intp], size: 
 
 
 def _lines(values: NDArray[Any], size: int) -> NDArray[np.void]:
-    """View the lines of patches as one item each, which NumPy copies at once: every `STRIDE` pixels of the frame's."""
+    """View `size` pixels from every `STRIDE`-th pixel on, which are a line of a patch, as one item, to copy at once."""
     of_pixel = values[0, 0].size
     view = sliding_window_view(values.reshape(-1), size * of_pixel, writeable=True)[:: STRIDE * of_pixel]
     return view.view(np.dtype((np.void, size * of_pixel * values.itemsize)))[:, 0]
@@ -78,13 +79,13 @@ def weights(weight: Singles, inner: Singles, shape: tuple[int, int], size: int) 
     Parameters
     ----------
     weight : (patch,) float32
-        w of `isp.ple.estimate`'s formula.
+        w_p of `isp.ple.estimate`'s formula.
     inner : (patch, 4) float32
-        Posterior variance of the mean of the patch's middle, by channel.
+        Posterior variance of the mean over the patch's middle half, per channel.
     shape : (ny, nx)
-        Rows and columns of patches.
+        Numbers of patches down and across.
     size : int
-        Pixels a side of a patch.
+        Side of a patch [pixels].
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Pick the prior's component that a patch comes from: candidates by a few directions, then exactly among these."""
+"""Choice of each patch's component in the prior: candidates by an approximate likelihood, then the likeliest one."""
 
 from collections.abc import Iterator
 
@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from isp.ple.tables import Table
 from rodcone.types import Singles
 
-BLOCK = 1000  # patches at once, which fit a core's cache; a power of two would map their lines to the same places of it
-MOST = 12  # candidates per patch, the likeliest in a few directions
+BLOCK = 1000  # patches at once, which fit into a core's cache, where rows of a power of two would share the same places
+MOST = 12  # largest number of trained candidates per patch
 
 
 def pick(components: Table, evidence: Singles, noise: Singles | None) -> tuple[NDArray[np.int16], Singles]:
@@ -19,16 +19,16 @@ def pick(components: Table, evidence: Singles, noise: Singles | None) -> tuple[N
     ----------
     components : Table
     evidence : (patch, sample + 1) or (patch, sample + 5) float32
-        Samples in units of noise, 1, and with a pilot its means.
+        Samples [units of noise], the number 1, and the pilot's means, if there is a pilot.
     noise : (patch,) float32 or None
-        The pilot's variance over the table's typical one.
+        The pilot's variance over the one that the table assumes; None without a pilot.
 
     Returns
     -------
     (patch,) int16
-        The component.
+        Number of the component.
     (patch,) float32
-        Its misfit: squared whitened samples over their number, 1 in the mean of patches that it explains.
+        Misfit: the mean of the squared whitened samples, which is about 1 if the component explains the patch.
     """
     count, size = len(evidence), len(components.rows)
     best = np.full(count, -np.inf, np.float32)
@@ -65,7 +65,8 @@ def blocks(index: NDArray[np.intp], length: int = BLOCK) -> Iterator[NDArray[np.
 def _candidates(components: Table, evidence: Singles) -> NDArray[np.bool_]:
     """Return which components may be the likeliest, (component, patch).
 
-    Trained ones by their likelihood in a few directions, fine lines by whether the pilot has a colour that lines have.
+    A trained component may be if its approximate likelihood (`Table.quick`) is near the largest. Fine lines may be if
+    the pilot has a colour that lines would have.
     """
     size = len(components.rows)
     trained = components.trained

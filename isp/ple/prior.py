@@ -1,8 +1,8 @@
 """The prior over patches: a mixture of Gaussians, the file that holds it, and the Gaussians in a patch's own pixels.
 
-A patch is 8x8 pixels of R, G, B and W, in roots of signal over the patch's mean W, so that one prior serves at every
-light. A signal is electrons over those of what the camera takes for white; its curves and the light decide what that
-is, its noise, well, exposure and mosaic don't.
+A patch is 8x8 pixels of R, G, B and W. Its values are square roots of signals over the patch's mean W, so that one
+prior serves at every level of light. A signal is a channel's electrons over those that white gives in this channel.
+White depends on the camera's curves and on the lamp, but not on noise, full well, exposure and mosaic.
 """
 
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from rodcone.errors import InputError, read_errors
 from rodcone.files import replacing
 
-PATCH = 8  # pixels a side
+PATCH = 8  # side of a patch [pixels]
 LETTERS = ("R", "G", "B", "W")
-OWN = Path(__file__).with_name("prior.npz")  # of the project's own curves, `sensor.curves.rgbw`
-MOST_BYTES = 1 << 26  # of the arrays, before memory is taken for them: the project's own have 0.7 MB
+OWN = Path(__file__).with_name("prior.npz")  # prior of the project's own curves, `sensor.curves.rgbw`
+MOST_BYTES = 1 << 26  # largest size of a file's arrays, checked before they are read; the project's own have 0.7 MB
 MOST_COMPONENTS = 4096
 _FIELDS = ("neutrals_e", "mean", "basis", "weights", "centres", "factors", "rest")
 
@@ -32,21 +32,22 @@ class Prior:
     Attributes
     ----------
     neutrals_e : (light, 4) float64
-        Electrons of R, G, B and W from white under D65 and other lights, relative to G: the curves that it is for.
+        Electrons of R, G, B and W from white under D65 and other lights, relative to G, with the curves that the prior
+        is for.
     mean : (256,) float32
-        Of all patches; pixels row by row, four channels each.
+        Mean of all patches: pixels row by row, four channels per pixel.
     basis : (256, direction) float32
         Orthonormal columns.
     weights : (component,) float32
-        Sum 1.
+        Probability of each component.
     centres : (component, direction) float32
-        Means, from `mean` on.
+        Means of the components minus `mean`, in the basis.
     factors : (component, direction, direction) float32
-        Lower triangular; covariance is factor times its transpose.
+        Lower triangular matrices; the covariance in the basis is a factor times its transpose.
     rest : (component,) float32
         Variance in each direction outside the basis.
     source : str
-        Command, versions, seed and hashes of what it was trained from, as JSON.
+        Command, versions, seed and hashes of the training data, as JSON.
     """
 
     neutrals_e: NDArray[np.float64]
@@ -60,7 +61,7 @@ class Prior:
 
     @property
     def neutral_e(self) -> NDArray[np.float64]:
-        """Return the electrons of R, G, B and W from white under D65, relative to G, shape (4,): signals of 1."""
+        """Return the electrons of R, G, B and W from white under D65, relative to G: a signal of 1, shape (4,)."""
         return np.asarray(self.neutrals_e[0])
 
 
@@ -71,7 +72,7 @@ class Mixture:
     Attributes
     ----------
     size : int
-        Pixels a side of the patch.
+        Side of the patch [pixels].
     log_weights : (component,) float64
     means : (component, size * size * 4) float64
     covariances : (component, size * size * 4, size * size * 4) float32
@@ -88,7 +89,7 @@ class Mixture:
 
 @cache
 def mixture(prior: Prior, size: int = PATCH) -> Mixture:
-    """Return the prior of the middle `size` pixels of its patches."""
+    """Return the Gaussians over the middle `size` x `size` pixels of the prior's patches."""
     inside = np.zeros((PATCH, PATCH, 4), dtype=bool)
     edge = (PATCH - size) // 2
     inside[edge : edge + size, edge : edge + size] = True
@@ -114,7 +115,8 @@ def load_prior(path: Path) -> Prior:
     Raises
     ------
     InputError
-        For a file that isn't one, holds over 64 MiB, other shapes, or values that are no finite numbers.
+        For a file that isn't a prior or holds over 64 MiB, arrays of other shapes, more than 4096 components, values
+        that aren't finite, or neutrals, weights or variances that aren't above 0.
     """
     # NumPy parses headers as Python's literals, which fail in many ways
     with read_errors(f"prior: {str(path)!r} can't be read", "give a file of `rodcone train`", Exception):
@@ -156,7 +158,7 @@ def load_prior(path: Path) -> Prior:
 
 
 def save_prior(prior: Prior, path: Path) -> None:
-    """Write a prior; factors and basis in half precision."""
+    """Write a prior, with factors and basis in half precision."""
     lower = prior.factors[:, *np.tril_indices(prior.factors.shape[1])].astype(np.float16)
     arrays = {name: getattr(prior, name) for name in _FIELDS} | {
         "factors": lower,

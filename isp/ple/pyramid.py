@@ -1,7 +1,7 @@
-"""From a raw image to every channel at every pixel: coarse scales first, each finer one told by the last.
+"""Estimation of every channel at every pixel of a raw image, from the coarsest scale to the finest.
 
-In the dark a patch of 8x8 pixels holds too little light to say what it shows. Sums of 2x2, 4x4, ... pixels say the
-means over larger patches; the finer scale takes them as further samples with a known error.
+In the dark a patch of 8x8 pixels holds too little light to show what is there. Sums over 2x2, 4x4, ... pixels show the
+means over larger patches; the next finer scale uses these means as further samples with a known error.
 """
 
 from dataclasses import dataclass
@@ -31,12 +31,12 @@ from rodcone.types import Singles
 from sensor.raw import RawImage
 
 TOGETHER = 32  # rows that stay in a core's cache while they are worked on
-COLOUR_SPREAD = 0.2  # relative standard deviation of the light that a patch's own sums show, by its colour
+COLOUR_SPREAD = 0.2  # relative error of the light that a patch's own sums show as if the patch were grey
 
 
 @dataclass(frozen=True)
 class PatchLight:
-    """Light of each patch, (ny, nx) [e- of white in G]; its variance is ``shot * light + floor``, and its colour's."""
+    """Light of each patch, (ny, nx) [e- of white in G], whose variance by noise is ``shot * light + floor``."""
 
     mean: Singles
     shot: Singles
@@ -49,23 +49,23 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     Parameters
     ----------
     raw : RawImage
-        Its tile is of R, G, B and W, and 1, 2 or 4 pixels high and wide.
+        Raw image whose tile holds only R, G, B and W, and is 1, 2 or 4 pixels high and wide.
     prior : Prior
-        Of the camera's curves.
+        Prior of the camera's curves.
     white_e : (4,) array_like
         Electrons of R, G, B and W from white under the scene's light, relative to G.
 
     Returns
     -------
     (h, w, channel) float32
-        In electrons, channels in the order of `sensor.cfa.channels`.
+        Estimates [e-], channels in the order of `sensor.cfa.channels`.
     (channel,) float64
-        Posterior variance of a pixel over a sample's noise, median over the patches.
+        Posterior variance of a pixel over the variance of a sample's noise, the median over the patches.
     """
     electrons = site_electrons(raw)
     full = full_white(raw)
     shot, dark_e = counted_noise(raw)
-    white_e = np.asarray(white_e) / shot  # as counted
+    white_e = np.asarray(white_e) / shot  # in counted electrons
     levels = pyramid(raw, white_e, electrons, full)
     coarsest = levels[-1]
     light = _light_of_sums(coarsest, [border(length, CELLS) for length in coarsest.full.shape[:2]], STRIDE).mean
@@ -104,7 +104,15 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
 
 
 def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[tuple[int, int]]:
-    """Return how many cells to add before and behind, so that each patch of the finer scale has its 4x4 cells."""
+    """Return how many cells to add at either end of each axis, so that every patch of the finer scale has 4x4 cells.
+
+    Parameters
+    ----------
+    shape, coarse : height and width
+        The finer scale's, and the coarser scale's.
+    size : int
+        Side of the finer scale's patches, in its own pixels.
+    """
     patches = [(length - 1) // STRIDE + size // STRIDE for length in shape]
     return [
         (size // STRIDE - 1, count + CELLS - size // STRIDE - cells)
@@ -113,13 +121,22 @@ def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[t
 
 
 def _light_of_sums(cells: Cells, sides: list[tuple[int, int]], stride: int) -> PatchLight:
-    """Estimate the light of patches of 4x4 cells from their own sums, weighted by noise, without full Ws."""
+    """Estimate the light of patches of 4x4 cells, as if grey, from their own sums without those of full Ws.
+
+    Parameters
+    ----------
+    cells : Cells
+    sides : list of two pairs of int
+        Cells to add by reflection at either end of each axis.
+    stride : int
+        Cells from patch to patch.
+    """
     gains, dark = (np.array(values)[list(cells.index)] for values in (cells.sampling.gains, cells.sampling.dark_e))
     weights = gains / (np.maximum(_medians(cells), 0.1) + dark**2)
-    mode: Literal["reflect", "symmetric"] = "symmetric" if cells.presence.all() else "reflect"  # which keeps the mosaic
+    mode: Literal["reflect", "symmetric"] = "symmetric" if cells.presence.all() else "reflect"  # keeps the mosaic
     full, sums = (_sums(np.pad(a, [*sides, (0, 0)], mode=mode), stride) for a in (cells.full, cells.electrons))
     weights = np.where(full > 0, 0.0, weights)
-    share = cells.presence.mean(axis=(0, 1))  # of cells that hold a channel
+    share = cells.presence.mean(axis=(0, 1))  # share of the cells that contain a channel
     gains = gains * share
     floors = dark**2 * share
     whole = CELLS**2 * (weights @ gains)
@@ -144,6 +161,7 @@ def _from_coarser(
     """Estimate light and pilot of each patch of a scale, from the coarser scale's estimate and the patch's own light.
 
     A patch of 8x8 pixels covers 4x4 cells of the coarser scale; a patch of 4x4 cells covers 2x2 of the coarser ones.
+    `before` and `now` are the samplings of the coarser scale and of this one.
     """
     values = np.empty((*coarse.planes.shape[:2], 7), np.float32)
     for first in range(0, len(values), TOGETHER):
@@ -160,7 +178,10 @@ def _from_coarser(
 
 
 def _in_finer_units(planes: Singles, variance: Singles, before: Sampling, now: Sampling) -> NDArray[np.float64]:
-    """Convert a scale's cells to a finer scale's units of noise: roots, their mean variance, light, its variance."""
+    """Convert a scale's estimates to a finer scale's units of noise, (row, column, 7).
+
+    The seven planes are readings of the four channels, their mean variance, light, and the variance of light.
+    """
     values = np.empty((7, *planes.shape[:2]))
     values[4] = 0.0
     for c in range(4):

@@ -1,12 +1,12 @@
-"""Colours between their samples: each follows the mosaic's sharpest channel along a local line.
+"""Interpolation of a colour between its samples by a local linear function of the mosaic's sharpest channel.
 
-After residual interpolation (D. Kiku, Y. Monno, M. Tanaka, M. Okutomi, IEEE Trans. Image Process. 25(3), 2016). For a
-colour c and the guide g, with <> the mean over 3x3 samples of c:
+This follows residual interpolation (D. Kiku, Y. Monno, M. Tanaka, M. Okutomi, IEEE Trans. Image Process. 25(3), 2016).
+Let c be a colour, g the guide (that channel), and <> the mean over 3x3 samples of c. Then
 
     a = <cov(c, g) / var(g)>,   b = c - a g                     (1) slope, and residual at each sample
     q = b + a g                                                 (2) prediction at a pixel between samples
 
-In (2) b and a are the means of the nearest two or four samples'. The prior desaturates strong colours. Its estimate p
+In (2), a and b are means over the nearest two or four samples. The prior desaturates strong colours. Its estimate p
 is therefore blended with q, each weighted by the other's estimated squared error:
 
     x = p - k D / (D + E) (p - q),   D = <(p - q)^2>            (3) the error of p, for the most part
@@ -16,9 +16,9 @@ is therefore blended with q, each weighted by the other's estimated squared erro
 Near grey the prior is better than the lines, which fail on fine grey stripes. The blend is therefore scaled by k, 0 in
 grey surroundings and 1 in coloured ones.
 
-Where the guide is every other pixel, as Bayer's G, it has to be estimated at the colour's own samples first: half of
-that value is p, the other half the sample plus the difference between both channels, which is interpolated along rows
-and columns, mostly from the side on which it changes less.
+If the guide has only every other pixel, like Bayer's G, it is first estimated at the colour's own samples. The value
+there is the mean of the prior's estimate and of the sample plus the difference g - c. This difference is interpolated
+along rows and columns, mostly from the side on which it changes less.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,12 +31,12 @@ from numpy.typing import NDArray
 from rodcone.types import Singles
 from sensor.cfa import Tile, channel_map, channels
 
-GUIDES = ("W", "G")  # the first that a mosaic has
+GUIDES = ("W", "G")  # the guide is the first of these that a mosaic has
 MIN_REL_VARIANCE = 1e-4  # of the guide's squared mean: added to var(g) so that an even guide gives a = <c> / <g>
-MISS_FACTOR = 0.25  # eq. (4): what interpolating b misses, of its squared difference from its neighbours' mean
-LEAST_MISS = 0.05  # eq. (4): the least error where a pixel is no better known than a sample [units of noise^2]
-OWN_WEIGHT = 0.62  # of the difference g - c at a colour's own sample; the rest is of the guide's sample beside it
-GREY, COLOURED = 0.04, 0.14  # of R, G or B over their mean: where lines begin to count, and where they count in full
+MISS_FACTOR = 0.25  # eq. (4): the squared error of interpolating b, over b's squared difference from its neighbours
+LEAST_MISS = 0.05  # eq. (4): `least`, if a pixel's posterior variance equals a sample's noise [units of noise^2]
+OWN_WEIGHT = 0.62  # weight of g - c at a colour's own sample; g - c at the guide's sample beside it has the rest
+GREY, COLOURED = 0.04, 0.14  # relative deviation of R, G or B from their mean: k is 0 up to GREY, 1 from COLOURED on
 MARGIN_PX = 18  # a result depends on pixels up to this far away
 TOGETHER = 128  # rows of a strip, an even number: a strip stays in a core's cache
 _LEAST = np.float32(1e-12)  # keeps divisions from 0 [units of noise^2]
@@ -65,14 +65,15 @@ def blend_with_lines(
     Parameters
     ----------
     planes : (h, w, channel) float32
-        In units of noise, channels in the order of `sensor.cfa.channels`; it is overwritten but for the samples.
+        Estimates [units of noise], channels in the order of `sensor.cfa.channels`. They are overwritten except at the
+        samples.
     tile : tuple of str
-        Of 1, 2 or 4 pixels a side. Channels on other sites are left as they are.
+        Tile of 1, 2 or 4 pixels a side. Channels on other sites than one of 2x2 pixels are left as they are.
     noise : (channel,) float64
         Posterior variance of a pixel over the variance of a sample's noise. Where it is small, single samples say
         little about lines.
     black : (channel,) sequence of float
-        Reading of no light, below which no prediction goes.
+        Reading without light, which is the lower limit of predictions.
     balanced : callable
         Converts values (..., channel) of `planes` to light, equal in all channels for a grey.
     """
@@ -121,7 +122,7 @@ def _colourfulness(
 
 
 def _blend(p: Singles, g: Singles, site: Phase, least: float, black: float, k: Singles) -> None:
-    """Overwrite a colour's estimate p (2, 2, row, column) by x of eq. (3), but for its samples, those of `site`."""
+    """Overwrite a colour's estimate p (2, 2, row, column) by x of eq. (3), except at `site`, where its samples are."""
     others = [phase for phase in np.ndindex(2, 2) if phase != site]
     line = _line(p[site], g[site])
     neighbours = sum(np.roll(line.b, step, axis) for step in (1, -1) for axis in (0, 1))
@@ -139,12 +140,15 @@ def _blend(p: Singles, g: Singles, site: Phase, least: float, black: float, k: S
 
 
 def _guide_at_samples(c: Singles, site: Phase, guide: Singles, besides: list[Phase]) -> Singles:
-    """Estimate the guide at a colour's samples c, from the guide's samples beside them in a row and in a column."""
+    """Estimate the guide at a colour's samples c, from the guide's samples beside them in a row and in a column.
+
+    `site` and `besides` are the phases of the colour and of the guide within 2x2 pixels.
+    """
     total, weights = np.zeros_like(c), np.zeros_like(c)
     for beside in besides:
         axis = int(beside[0] == site[0])
         step = site[axis] - beside[axis]
-        # Guide less colour: at the colour's samples, and at the guide's on either side.
+        # The difference guide minus colour: at the colour's samples, and at the guide's on either side.
         here = _predict(c, site, guide[beside], beside) - c
         there = guide[beside] - _predict(guide[beside], beside, c, site)
         sides = there, np.roll(there, -step, axis)
@@ -166,7 +170,7 @@ def _predict(c: Singles, site: Phase, other: Singles, beside: Phase) -> Singles:
 def _line(c: Singles, g: Singles) -> Line:
     """Fit the line of c over g around each sample, eq. (1)."""
     c_mean, g_mean = _means(c), _means(g)
-    # <g g> - (1 - e) <g>^2 is var(g) + e <g>^2, and likewise the covariance: e = MIN_REL_VARIANCE.
+    # With e = MIN_REL_VARIANCE, <g g> - (1 - e) <g>^2 is var(g) + e <g>^2. The covariance gets e <c> <g> likewise.
     share = np.float32(1.0 - MIN_REL_VARIANCE)
     g_variance = _means(g * g) - share * g_mean * g_mean + _LEAST
     a = _means((_means(c * g) - share * c_mean * g_mean) / g_variance)

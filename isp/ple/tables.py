@@ -1,9 +1,9 @@
-"""The prior in a frame's own units of noise, at one light: what picks a component, and the estimate that it gives.
+"""The prior at one light in a frame's own units of noise: likelihoods of its components, and the estimate by each.
 
-In units of noise (`isp.ple.units`) a sample of e expected electrons reads t(e) in the mean, with noise of variance r.
-Of a patch with light m and roots of signal u, a sample of channel c holds e = m g_c u^2. About a component's mean t is
-straight in u, so each component is a Gaussian over t as well. Its estimate from the mosaic's samples y is the linear
-one with the least squared error, t + C_xy (C_yy + N)^-1 (y - t_y).
+In units of noise (`isp.ple.units`) a sample of e expected electrons has the mean reading t(e) and noise of variance r.
+In a patch of light m and roots of signal u, a sample of channel c with gain g_c has e = m g_c u^2. Near a component's
+mean, t is taken as linear in u, so that each component is a Gaussian over t as well. Its estimate from the mosaic's
+samples y is the linear one with the least squared error, t + C_xy (C_yy + N)^-1 (y - t_y), where N holds the noise r.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,16 +21,18 @@ from isp.ple.prior import PATCH, Mixture, Prior, mixture
 from isp.ple.units import readings
 from rodcone.types import Floats, Singles
 
-STEP = 1.25  # of light, from one table to the next
+STEP = 1.25  # ratio of the light of one table to that of the table before
 LIGHT_ERROR = 0.12  # relative standard deviation of a patch's light, the step's included
-PILOT_ERROR = 0.03  # by which a coarser scale may differ from the patch, beside its variance [of the light]
-PILOT_VARIANCE = 0.02  # typical of a coarser scale [units of noise^2]
-BRIGHTNESS = 0.98  # share of that variance that is of brightness: a coarser scale knows colour much better
-TAPER = 1.0  # power of half a sine: the weight of a patch's pixels
-DIRECTIONS = 20  # directions in which components are told apart first
-MARGINS = (5.0, 15.0)  # of that log likelihood: where the other directions are noise, and where they are all signal
-# Tables that are kept, all of a 4x4 tile over six decades of light: 0.6 MB each, and 90 kB for each of its components
-# of 8x8 pixels that was asked for.
+PILOT_ERROR = 0.03  # further error of a coarser scale's means, beside their variance [share of the light]
+PILOT_VARIANCE = 0.02  # typical variance of a coarser scale's means [units of noise^2]
+BRIGHTNESS = 0.98  # share of that variance that lies in brightness; a coarser scale knows colour much better
+TAPER = 1.0  # power of the half sine by which a patch's pixels are weighted
+DIRECTIONS = 20  # directions over which the approximate likelihood is computed that selects candidates
+# A candidate's approximate log likelihood lies at most so far below the largest: the first number if the remaining
+# directions hold only noise, the second if they hold only signal.
+MARGINS = (5.0, 15.0)
+# Number of tables that are kept, which suffices for a 4x4 tile over six decades of light. A table has 0.6 MB, and for
+# 8x8 pixels 90 kB more per component that a patch has needed.
 _TABLES = 512
 _ONE_FRAME = ContextVar("one_frame", default=False)
 
@@ -56,11 +58,11 @@ class Sampling:
     Attributes
     ----------
     size : int
-        Pixels a side of a patch.
+        Side of a patch [pixels].
     rows : tuple of int
         Places of the samples in the patch's vector, 4 * pixel + channel.
     gains : (4,) tuple of float
-        Electrons of a sample of each channel in unit light, from white.
+        Electrons that white gives in a sample of each channel at unit light.
     dark_e : (4,) tuple of float
         Dark noise of a sample [e-].
     prnu : float
@@ -85,14 +87,15 @@ class Estimator:
     Attributes
     ----------
     linear : (sample + 5, value) float32
-        On the samples, 1, and the pilot's innovation over its variance in each of its four directions; it gives
-        readings over `Sampling.black`.
+        Matrix that is applied to the samples, the number 1, and the pilot's innovation over its variance in each of
+        four directions. It gives mean readings minus `Sampling.black`, times the window.
     variance, noise : (4,) float64
-        Posterior variance of a pixel, mean by channel, and the same over the variance of a sample's noise.
+        Posterior variance of a pixel given the samples alone, the mean per channel; and this over the variance of a
+        sample's noise.
     inner : (4,) float64
-        Posterior variance of the mean of the patch's middle, by channel.
+        Posterior variance of the mean over the patch's middle half, per channel.
     pilot_variance, pilot_inner : (4, 4) float64
-        What a direction (row) takes off both, over its variance.
+        How much the pilot reduces `variance` and `inner` in each direction (row), times the innovation's variance.
     """
 
     linear: Singles
@@ -104,7 +107,7 @@ class Estimator:
 
 
 def taper(size: int) -> Singles:
-    """Return the weight of each line of a patch's pixels where patches overlap; it falls towards uncertain edges."""
+    """Return the weights of a patch's rows where patches overlap; they fall towards the edges, which are uncertain."""
     return np.asarray(np.sin(np.pi * (np.arange(size) + 0.5) / size) ** TAPER, dtype=np.float32)
 
 
@@ -115,19 +118,20 @@ def window(size: int) -> Singles:
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Linear map from a patch's evidence to independent numbers of variance 1, for a patch of one component.
+    """Linear map from a patch's evidence to numbers that are independent if the patch comes from one component.
 
     Attributes
     ----------
     reads : (sample + 5, sample + 4) float32
-        Applied to the samples, 1 and the pilot's means. It gives whitened samples and the pilot's innovations (what the
-        samples don't predict of it) in four directions that are independent given the samples.
+        Matrix that is applied to the samples, the number 1 and the pilot's means. It gives whitened samples, which have
+        variance 1, and the pilot's innovations (the part of the pilot that the samples don't predict) in four
+        directions that are independent given the samples.
     log_scale : float
-        Log likelihood of samples at the component's mean, its weight included.
+        Log likelihood of samples that equal the component's mean, plus the log of the component's weight.
     spread : (4,) float64
         Variance of the innovations without the pilot's own noise.
     turn : (4, 4) float64
-        Takes the pilot's means to the four directions.
+        Matrix from the pilot's means to the four directions.
     """
 
     reads: Singles
@@ -145,9 +149,9 @@ class Among:
     squares : (component, value) float64
         Mean squares of the roots of signal.
     samples : (component, sample, sample) float64
-        Covariances of samples.
+        Covariances of the roots of signal at the samples.
     by_channel : (component, channel, pixel, value) float32
-        Covariances of all values, those of a channel together.
+        Covariances of the roots of signal, each channel's at every pixel with all values.
     """
 
     squares: Floats
@@ -156,7 +160,7 @@ class Among:
 
 
 class Table:
-    """All components at one light, and the quick likelihood that picks among them.
+    """All components at one light, and the quick, approximate likelihood that selects candidates among them.
 
     A component's whitening and estimator are made when a patch first needs them, because most tables need only one in
     four of their components.
@@ -170,14 +174,14 @@ class Table:
         among = _among(mix, sampling.rows)
         gains, dark = (np.tile(values, pixels) for values in (sampling.gains, sampling.dark_e))
         self.unit_e = gains * light  # electrons of a signal of 1
-        # The components in units of noise: values t, their slope in u, and their slope in the light.
+        # Each component's mean readings t, their slopes over electrons, and the variance by noise.
         electrons = self.unit_e * among.squares
         self.values, steep, noise = (np.empty_like(electrons) for _ in range(3))
         for channel, dark_e in enumerate(sampling.dark_e):
             places = (slice(None), slice(channel, None, 4))
             self.values[places], steep[places], noise[places] = readings(dark_e).moments(electrons[places])
         self.black, self.taper = np.tile(sampling.black, pixels), np.repeat(window(mix.size), 4)
-        # The pilot: the patch's means by channel.
+        # `average` turns a patch's values into the pilot, which is the patch's mean per channel.
         self.average = np.tile(np.eye(4), pixels) / pixels
         self.unit = (1.0 / (steep**2 * (electrons + dark**2))) @ self.average.T
         signal = electrons * steep
@@ -191,23 +195,24 @@ class Table:
         along = brightness / np.linalg.norm(brightness)
         error = PILOT_VARIANCE * (4 * BRIGHTNESS * np.outer(along, along) + (1 - BRIGHTNESS) * np.eye(4))
         white = np.linalg.inv(np.linalg.cholesky(error + np.diag((PILOT_ERROR * brightness) ** 2)))
-        self.white = white.astype(np.float32)  # takes the pilot's means to errors of 1, at a noise of 1
-        # Its covariances with samples, and its own.
+        self.white = white.astype(np.float32)  # scales the pilot's errors to variance 1 where `noise` is 1
+        # The pilot's covariances with the samples, and with itself.
         slopes = self.slopes.reshape(len(electrons), pixels, 4).swapaxes(1, 2) / pixels
         lean = (slopes.astype(np.float32)[:, :, None] @ among.by_channel)[:, :, 0] * self.slopes[:, None]
         drift = (self.average @ self.drift.T).T
         self.pilot_samples = lean[:, :, at] + drift[:, :, None] * self.drift[:, None, at]
         self.pilot_pilot = lean @ self.average.T + drift[:, :, None] * drift[:, None]
-        # Coarser scales take fine lines for a colour: an error as large as the light makes them count for nothing.
+        # Coarser scales see fine lines as a colour. An error as large as the light makes the pilot count for nothing.
         self.pilot_pilot[self.trained :] += np.diag(brightness**2)
-        # What fine lines of contrast 1 would add to the pilot's means, and how much of it makes a patch one of them.
+        # What fine lines of contrast 1 would add to the pilot's means, and the least such part for which lines are
+        # tried; both are relative to typical means.
         sampled = np.isin(np.arange(4), at % 4) / (self.average @ (self.values[: self.trained] - self.black).T).mean(
             axis=1
         )
         self.aliased = (aliased(at, mix.size) * sampled).astype(np.float32)
         self.least_aliased = (LEAST_ALIASED * sampled).astype(np.float32)
         self.centre, self.directions, self.quick, outside = self._quick_likelihood()
-        # The quick likelihood may be wrong by the more, the more signal the directions hold that it leaves out.
+        # The more signal lies in the directions that the quick likelihood leaves out, the more wrong it may be.
         share = 1.0 - np.mean(self.noise[: self.trained]) / (np.exp(mix.log_weights[: self.trained]) @ outside)
         self.margin = float(np.interp(share, (0.0, 1.0), MARGINS))
         self._whitenings: dict[int, Whitening] = {}
@@ -215,15 +220,20 @@ class Table:
         self._making = RLock()
 
     def _quick_likelihood(self) -> tuple[Singles, Singles, Singles, Floats]:
-        """Return the log likelihood of samples and pilot by their coordinates in `DIRECTIONS` directions.
+        """Compute what gives the log likelihood of samples and pilot by their coordinates in `DIRECTIONS` directions.
 
-        With z a patch's coordinates, of mean m and covariance C in a component of weight w, and q the summed squares in
-        the n other directions, which count by their mean variance o alone, twice the log likelihood is
+        Let z be a patch's coordinates, and let m and C be their mean and covariance in a component of weight w. Let q
+        be the sum of squares in the n other directions, which all count with their mean variance o. Twice the log
+        likelihood is
 
             2 log w - (z - m)^T C^-1 (z - m) - log |C| - q / o - n log o.
 
-        That of all trained components is one matrix times the products of pairs of z, z, q and 1: C^-1, C^-1 m, 1 / o
-        and the rest.
+        The log likelihoods of all trained components are one matrix times the column of the products z_i z_j, z, q
+        and 1. Each of its rows holds C^-1, C^-1 m, 1 / o and the constant of a component, with their factors.
+
+        Returns
+        -------
+        centre of the coordinates, directions, that matrix, o of each component
         """
         at = self.rows
         own = len(self.rows)
@@ -264,7 +274,7 @@ class Table:
         return centre.astype(np.float32), directions.astype(np.float32), quick.astype(np.float32), outside
 
     def end_frame(self) -> None:
-        """Let whitenings and estimators go within `one_frame`."""
+        """Release the whitenings and estimators if this is within `one_frame`."""
         if _ONE_FRAME.get():
             with self._making:
                 self._whitenings, self._estimators = {}, {}
@@ -286,7 +296,8 @@ class Table:
                 self._whitenings |= self._made_whitenings(ks)
 
     def _made_whitenings(self, ks: list[int]) -> dict[int, Whitening]:
-        # C_yy = S A S + d d^T + N: A of the roots, S their slopes, d what an error of the light brings, N noise.
+        # C_yy = S A S + d d^T + N, with the covariance A of the roots, their slopes S, the change d of readings by the
+        # light's standard error, and the noise N.
         at = self.rows
         own = len(self.rows)
         slopes, drift = self.slopes[ks][:, at], self.drift[ks][:, at]
@@ -295,9 +306,9 @@ class Table:
         scatter *= slopes[:, None]
         scatter += drift[:, :, None] * drift[:, None]
         scatter[:, np.arange(own), np.arange(own)] += self.noise[ks]
-        # F of F C_yy F^T = 1, so that F (y - t_y) are independent numbers of variance 1.
+        # F satisfies F C_yy F^T = 1, so that F (y - t_y) are independent numbers of variance 1.
         factors = _triangular_inverses(np.asarray(np.linalg.cholesky(scatter), np.float64))
-        # H = C_py F^T. The pilot's innovation p - t_p - H F (y - t_y), in units of its errors, is turned so that its
+        # H is C_py F^T. The pilot's innovation p - t_p - H F (y - t_y), in units of its errors, is turned so that its
         # four directions are independent given the samples: by the eigenvectors of its covariance C_pp - H H^T.
         half = self.pilot_samples[ks] @ factors.swapaxes(1, 2)
         left = self.white @ (self.pilot_pilot[ks] - half @ half.swapaxes(1, 2)) @ self.white.T
@@ -314,7 +325,10 @@ class Table:
 
     @cached_property
     def roots(self) -> tuple[Singles, Singles]:
-        """Return slope and start, (component, value), of the line from `Estimator.linear` to twice root electrons."""
+        """Return slope and offset of the line from `Estimator.linear`'s result to twice the root of expected electrons.
+
+        Both have the shape (component, value).
+        """
         root = 2.0 * np.sqrt(self.unit_e)
         start = root * (self.mix.means - (self.values - self.black) / self.slopes)
         return (root / (self.slopes * self.taper)).astype(np.float32), start.astype(np.float32)
@@ -349,7 +363,7 @@ class Table:
         means += np.outer(self.average @ drift, drift) - (self.average @ crossed.T) @ estimate
         pilot = whitening.turn @ means  # covariance of the pilot's four innovations with every value
         middle, of_middle = _middle(size)
-        among = covariance[middle[:, :, None], middle[:, None]]  # the covariances of its pixels, by channel
+        among = covariance[middle[:, :, None], middle[:, None]]  # the covariances of the middle's pixels, per channel
         inner = np.einsum("ci,cij,cj->c", slopes[middle], among, slopes[middle]) / middle.shape[1] ** 2
         inner += (of_middle @ drift) ** 2 - ((of_middle @ crossed.T) * (of_middle @ estimate.T)).sum(axis=1)
         linear = np.empty((own + 5, len(slopes)), np.float32)
@@ -368,9 +382,9 @@ class Table:
 
 @cache
 def _middle(size: int) -> tuple[NDArray[np.intp], Floats]:
-    """Return where the pixels of a patch's middle half lie in its vector, (channel, pixel), and what averages them.
+    """Return the indices of the middle half's pixels in a patch's vector, (channel, pixel), and a matrix of averages.
 
-    The averages are by channel, (channel, value).
+    The matrix, (channel, value), averages these pixels per channel.
     """
     inside = np.arange(size)[size // 4 : -(size // 4)]
     places = 4 * (size * inside[:, None] + inside).ravel() + np.arange(4)[:, None]
@@ -380,7 +394,10 @@ def _middle(size: int) -> tuple[NDArray[np.intp], Floats]:
 
 
 def _triangular_inverses(lower: Floats) -> Floats:
-    """Invert lower triangular matrices (matrix, row, column), by halves: [[A, 0], [B, C]] has -C^-1 B A^-1 below."""
+    """Invert lower triangular matrices (matrix, row, column) by halves.
+
+    The inverse of [[A, 0], [B, C]] is [[A^-1, 0], [-C^-1 B A^-1, C^-1]].
+    """
     if lower.shape[-1] == 1:
         return 1.0 / lower
     half = lower.shape[-1] // 2
@@ -404,6 +421,6 @@ def _among(mix: Mixture, rows: tuple[int, ...]) -> Among:
 
 @lru_cache(maxsize=_TABLES)
 def table(prior: Prior, sampling: Sampling, step: int) -> Table:
-    """Return the table at light ``STEP ** step``."""
+    """Return the table of a prior and a sampling at the light ``STEP ** step``."""
     mix = mixture(prior, sampling.size)
     return Table(with_fine_lines(mix) if sampling.size == PATCH else mix, sampling, STEP**step)

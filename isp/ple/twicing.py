@@ -1,24 +1,26 @@
-"""Colour that the prior took off and the samples still hold, added back: twicing (Tukey 1977) of colours alone.
+"""Twicing (Tukey 1977) of colours: colour that the prior removed, although the samples show it, is added back.
 
-In the dark the prior takes strong colours for greyer than they are, at every scale, and red for the hue of what is
-common around it. Over a region of one colour the samples tell better: what they differ from the estimate by, in the
-mean, is the estimate's bias b_c and noise. Means are over cells of 4x4 pixels, in which every channel has samples,
-weighted by how alike cells are in the estimate (as a bilateral filter, Tomasi & Manduchi 1998):
+In the dark the prior desaturates strong colours at every scale, and turns red towards the hues that are common near it.
+Over a region of one colour the samples know better: their mean difference from the estimate is the estimate's bias b_c,
+plus noise. Means are over cells of 4x4 pixels, in which every channel has samples, weighted by how alike cells are in
+the estimate (as in a bilateral filter, Tomasi & Manduchi 1998):
 
     b_c(i) = sum_j w_ij r_c(j) / sum_j w_ij n_c(j),   w_ij = exp(-|x_i - x_j|^2 / 2 ALIKE^2),
 
-r_c the sum of the residuals of a cell's n_c samples, x the estimate in units of noise. Brightness is best known by the
-mosaic's sharpest channel g and stays: a colour gets d_c = b_c - (x_c / x_g) b_g, times 1 - SURE / chi^2 where positive
-(James & Stein 1961), chi^2 the mean over the colours of d_c^2 over its variance s_c^2. The estimate is seldom wrong
-by more than half of a colour's light x_c, which is therefore the prior deviation of its bias, and d_c counts by
-Wiener's share (x_c / 2)^2 / ((x_c / 2)^2 + s_c^2): samples that know a region's light worse than that add noise alone.
-It is added as a share of the colour's light, so that a region's shadows keep their share.
+where r_c is the sum of the residuals of a cell's n_c samples of channel c, and x the estimate in units of noise. The
+mosaic's sharpest channel g knows brightness best, so that brightness isn't changed. With the estimated light l_c [e-],
+a colour gets d_c = b_c - (l_c / l_g) b_g, times 1 - SURE / chi^2 where that is positive (James & Stein 1961). Here
+chi^2 is the mean over the colours of d_c^2 over its variance s_c^2. The estimate is seldom wrong by more than half of a
+colour's light l_c. This half is therefore the prior standard deviation of its bias, and d_c is multiplied by Wiener's
+share (l_c / 2)^2 / ((l_c / 2)^2 + s_c^2), because samples that know a region's light less well add only noise. The
+result is added as a share of the colour's light, so that dark places of a region get less.
 
-What 16 pixels around tell too little of, a wider region may tell, such as that a whole picture is red. The same is
-therefore done three times, the widest first: with cells of 16, of 8 and of 4 pixels, each with what is left.
+Where the 16 pixels on each side show too little, a wider region may show enough, for example if a whole picture is red.
+The same is therefore done three times, with cells of 16, then 8, then 4 pixels a side, each time with the residuals
+that are left.
 
 A cell of 4x4 pixels in which the residuals of a channel differ from each other by more than noise holds a lamp or an
-edge, and no even surface. It gives no residuals to any cell and nothing is added to it.
+edge, and no even surface. Its residuals count for no cell, and nothing is added to it.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -34,28 +36,28 @@ from sensor.cfa import channel_map
 from sensor.raw import RawImage
 
 CELL = 4  # side of a cell [pixels]; no tile is larger
-TOGETHER_CELLS = (4, 2, 1)  # cells in a row and in a column that are taken as one, in turn
+TOGETHER_CELLS = (4, 2, 1)  # side of the squares of cells that are treated as one cell, in each of the three rounds
 REACH = 4  # cells on each side whose residuals count
 SURE = 1.5  # chi^2 up to which nothing is added; 1 would bring hues a little nearer, but coloured clouds into black
 LIKELY_BIAS = 0.5  # standard deviation of the bias that a colour's estimate is expected to have [share of its light]
 ALIKE = 1.0  # standard deviation of the weight over the difference of two cells' estimates [units of a sample's noise]
 LEAST_ALIKE = 0.05  # sum of weights below which the wider cells around a cell count for less
 TOGETHER = 16  # rows of cells that are worked on together
-LAMP_SIGMAS = 6.0  # root of a cell's summed squared residuals, above which it holds no even surface
+LAMP_SIGMAS = 6.0  # root of a cell's summed squared residuals from which it holds no even surface [sigmas of noise]
 _LEAST = np.float32(1e-12)
 
 
 def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
-    """Add to each colour the mean of what samples in similar places hold beyond the estimate.
+    """Add to each colour the mean residual of the samples in similar places.
 
     Parameters
     ----------
     planes : (h, w, channel) float32
         Estimate [e-], channels in the order of `sensor.cfa.channels`; it is overwritten.
     stable : (h, w, channel) float32
-        The same in units of noise.
+        The same estimate [units of noise].
     raw : RawImage
-        Of a tile of 1, 2 or 4 pixels a side. Saturated samples say nothing.
+        Raw image whose tile has 1, 2 or 4 pixels a side. Its saturated samples aren't used.
     """
     names = raw.channels
     guide = next((names.index(name) for name in GUIDES if name in names), None)
@@ -81,7 +83,7 @@ def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
     surface = np.all(spread < LAMP_SIGMAS**2 * of_light, axis=-1, keepdims=True)
     n *= surface
 
-    # A share raises what isn't under 0: of a cell's light, and of what its samples were taken for.
+    # Shares are added only to estimates above 0: their sums over a cell, and over its samples.
     positive = np.maximum(planes, np.float32(0))
     raised, raised_at_sites = _sums(positive), _sums(np.where(sites, positive, np.float32(0)))
     factor = np.ones_like(light)
@@ -102,7 +104,7 @@ def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
 
 
 def _to_pixels(cells: Singles) -> Singles:
-    """Return the values of each row's pixels: means of the cells' values over the 2 `CELL` - 1 pixels around them."""
+    """Interpolate rows of cells to rows of pixels; a pixel gets the mean over the 2 `CELL` - 1 pixels around it."""
     wide = np.pad(cells, ((1, 1), (0, 0)), mode="edge")
     side = 2 * CELL - 1
     place = np.arange(CELL, dtype=np.float32)[:, None] / side
@@ -114,8 +116,9 @@ def _to_pixels(cells: Singles) -> Singles:
 def _to_cells(share: Singles, wide: Singles, x: Singles, together: int) -> Singles:
     """Interpolate the shares of wider cells to cells, weighted by how alike the cells are in x.
 
-    The interpolation is linear between the centres of the wider cells. A cell that is like none of the wide ones around
-    it, as beside an edge, gets next to nothing.
+    The interpolation is linear between the centres of the wider cells, each of which is `together` x `together` cells
+    with the mean `wide` of x. A cell that is like none of the wider ones around it, such as a cell beside an edge, gets
+    next to nothing.
     """
     if together == 1:
         return share
@@ -142,7 +145,7 @@ def _to_cells(share: Singles, wide: Singles, x: Singles, together: int) -> Singl
 
 
 def _biases(x: Singles, sums: list[Singles], light: Singles, guide: int, colours: list[int]) -> Singles:
-    """Return `_bias` of all cells, by strips of rows; its parameters come without the `REACH` cells around."""
+    """Compute `_bias` of all cells in strips of rows; `x` and `sums` are `wide` there without `REACH` cells around."""
     sides = ((REACH, REACH), (REACH, REACH), (0, 0))
     wide = [np.pad(values, sides) for values in (x, *sums)]  # nothing is known beyond the picture
     bias = np.empty_like(light)
@@ -165,11 +168,12 @@ def _bias(x: Singles, wide: list[Singles], light: Singles, guide: int, colours: 
     x : (row, column, channel) float32
         Mean estimate of each cell [units of noise].
     wide : list of arrays
-        x, the sums r_c of residuals, the counts n_c and n_c times the variance of a sample, with `REACH` cells around.
+        x, the sums r_c of residuals, the counts n_c, and n_c times the variance of a sample's noise, each with `REACH`
+        cells around.
     light : like `x`
-        The mean estimate x_c [e-], 0 or more.
+        The mean estimate l_c [e-], 0 or more.
     guide, colours : int, and list of int
-        Which channels they are.
+        Indices of the guide and of the colours among the channels.
     """
     x_wide, *sums_wide = wide
     height, width = x.shape[:2]
@@ -183,7 +187,7 @@ def _bias(x: Singles, wide: list[Singles], light: Singles, guide: int, colours: 
     n = np.maximum(n, _LEAST)
     b = r / n
     variance = variance / n**2
-    # x_c / x_g, the guide's light at least its standard deviation
+    # l_c / l_g, where the guide's light is at least its standard deviation
     guide_light = np.maximum(light[..., guide], np.sqrt(variance[..., guide]))[..., None] + _LEAST
     share = light / guide_light
     d = b - share * b[..., guide, None]
@@ -197,7 +201,7 @@ def _bias(x: Singles, wide: list[Singles], light: Singles, guide: int, colours: 
 
 
 def _sums(values: NDArray[Any], side: int = CELL) -> Singles:
-    """Sum `side` x `side` values each; sums at the far edges may be over fewer."""
+    """Sum squares of `side` x `side` values; those at the bottom and the right edge may have fewer values."""
     height, width = values.shape[:2]
     filled = np.pad(values, ((0, -height % side), (0, -width % side), *((0, 0),) * (values.ndim - 2)))
     cells = filled.reshape(len(filled) // side, side, filled.shape[1] // side, side, *values.shape[2:])

@@ -1,15 +1,15 @@
-"""Samples in units of noise: the transform, what it reads of expected electrons, and which electrons a reading means.
+"""Samples in units of noise: the transform to readings, the mean reading of expected electrons, and its inverse.
 
-The transform is the generalised Anscombe transform (`isp.anscombe`) for `LIFT` times the dark noise s. It bends most
-under 0, where no light is: a sample far under 0 would lie even farther from its neighbours, and a patch that takes it
-for signal would show a dark speck. So samples under -`FLOOR` s count as -`FLOOR` s.
+The transform is the generalised Anscombe transform (`isp.anscombe`) for `LIFT` times the dark noise s. It is steepest
+below 0 electrons. A sample far below 0 would therefore be moved even farther from its neighbours, and would become a
+dark speck in the estimate. Therefore samples below -`FLOOR` s count as -`FLOOR` s.
 
-Mean and variance of a reading t(X) follow from the distribution of X about e expected electrons,
+Mean and variance of a reading t(X) follow from the distribution of the sample X around e expected electrons,
 
     X = e + v (z + k (z^2 - 1) / 6),   v^2 = e + s^2,   k = e / v^3,   z normal,
 
-which has the mean, variance and skewness of shot and dark noise (Cornish & Fisher 1938); for s under 1 e- they are sums
-over Poisson's counts. In light the mean is 2 sqrt(e + d^2 + 1/8), d = `LIFT` s, and the variance 1.
+which has the mean, variance and skewness of shot and dark noise (Cornish & Fisher 1938). For s below 1 e- they are sums
+over Poisson's counts instead. In bright light the mean is 2 sqrt(e + d^2 + 1/8) with d = `LIFT` s, and the variance 1.
 """
 
 from dataclasses import dataclass
@@ -22,30 +22,30 @@ from numpy.typing import NDArray
 from isp.anscombe import stabilise
 from rodcone.types import Floats
 
-# For dark noise of its own size the transform makes outliers of dark samples; for twice of it, it is nearly straight.
+# With the dark noise itself the transform turns dark samples into outliers; with twice the noise it is nearly straight.
 LIFT = 2.0
-FLOOR = 0.7  # dark noises under 0
-_KNOTS, _STEPS = 200, 8192  # at which the curves are made, and between which they are looked up
-_LARGEST_ROOT = 8.0  # of expected electrons, over the dark noise: from there on the curves keep their last value
+FLOOR = 0.7  # how far below 0 e- the smallest sample may lie [dark noises]
+_KNOTS, _STEPS = 200, 8192  # points at which the curves are computed, and entries of the tables that interpolate them
+_LARGEST_ROOT = 8.0  # root of electrons over dark noise (at least 1 e-) from which on curves keep their last value
 _FEWEST = np.finfo(np.float64).tiny
 _NORMAL = np.linspace(-6.0, 6.0, 193)
 
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """Mean, slope and variance of readings over expected electrons e, and the way back, at one dark noise.
+    """Mean, slope and variance of readings as functions of expected electrons e, and the mean's inverse.
 
     Attributes
     ----------
     dark_e : float
         Dark noise s [e-].
     most : (2,) tuple of float
-        sqrt(e) at the end of the first three curves, and the mean reading there, at that of the last one.
+        sqrt(e) at which the first three curves end, and the mean reading there, at which `excess` ends.
     offset, steepness, variances : (step,) float64
-        Mean less 2 sqrt(e + d^2 + 1/8), slope times this root, and variance as a share of (e + s^2 + 1/8) /
-        (e + d^2 + 1/8), each over sqrt(e).
+        Curves in equal steps of sqrt(e), with R = sqrt(e + d^2 + 1/8): the mean minus 2 R, the slope times R, and the
+        variance divided by (e + s^2 + 1/8) / R^2.
     excess : (step,) float64
-        Electrons over t^2 / 4 - d^2 - 1/8, over readings t.
+        Curve in equal steps of the mean reading t: electrons minus (t^2 / 4 - d^2 - 1/8).
     """
 
     dark_e: float
@@ -99,7 +99,7 @@ def readings(dark_e: float) -> Readings:
     if dark_e < 1.0:
         counts = np.arange(2 * electrons[-1, 0])
         factorials = np.concatenate([[0.0], np.cumsum(np.log(counts[1:]))])  # their logarithms
-        # Of no electrons: a logarithm so low that every count but 0 has a share of 0.
+        # Without electrons, the logarithm is so low that every count but 0 has a share of 0.
         shares = np.exp(counts * np.log(np.maximum(electrons, _FEWEST)) - electrons - factorials)
         values = transform(counts[:, None] + dark_e * _NORMAL, dark_e)
     else:
@@ -123,12 +123,12 @@ def readings(dark_e: float) -> Readings:
 
 
 def _limit(electrons: NDArray[Any], dark_e: float) -> Floats:
-    """Return half of the mean reading that the formula for light gives."""
+    """Return sqrt(e + d^2 + 1/8), which is half of the mean reading in bright light."""
     return np.asarray(np.sqrt(np.asarray(electrons, np.float64) + ((LIFT * dark_e) ** 2 + 0.125)))
 
 
 def _straight(electrons: NDArray[Any], dark_e: float) -> NDArray[Any]:
-    """Return the variance of a reading if the transform is taken for straight."""
+    """Return the variance that a reading would have if the transform were straight."""
     base = electrons + (dark_e**2 + 0.125)
     return np.asarray(base / (base + (LIFT**2 - 1) * dark_e**2))
 
