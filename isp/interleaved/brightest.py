@@ -1,7 +1,7 @@
-"""Upper limit of the samples that count at a pixel: its channel's brightest sample nearby, plus noise.
+"""Upper limit of the samples that count at a pixel: the brightest sample of their channel near the pixel, plus noise.
 
-The similarity doesn't see all light: where W's SNR is below 1 it fades, and a lamp of one pixel on a colour's site
-never reaches W. Without this limit the light of such a lamp would be spread over all of Omega
+The similarity misses some light: it fades where W's SNR is below 1, and a lamp of one pixel on a colour's site leaves
+no trace in W. Without this limit the light of such a lamp would be spread over all of Omega
 (docs/decisions/0037-lamps-in-the-dark.md).
 """
 

@@ -44,50 +44,58 @@ def sharpen(
 ) -> NDArray[np.float32]:
     """Estimate every channel at each pixel from the nine samples around it.
 
-    With m and C the mean and the covariance of the channels' planes P over 5 x 5 pixels and N = m + s^2 a sample's
-    noise, s the dark noise, the contrast of the window is
+    Let P be the channels' planes, m and C their mean and covariance over a window of 5 x 5 pixels, s the dark noise,
+    and N = m + s^2 the variance of a sample's noise. The contrast of the window is
 
         e = sum_c C_cc / N_c / (1 + sum_c m_c^2 / N_c).
 
-    Light varies 2.5 times as much as the planes, which are means, and 0.7 of that is shading of the mean colour:
-    C' = 0.75 C + 1.75 e m m^T. Samples S_y of channels o_y, at distances of r pixels, are correlated by exp(-r^2 / 2).
-    Their best linear estimate of the channels is
+    The variance of light is assumed to be 2.5 times that of the planes, because these are means, and 0.7 of it to be
+    shading of the mean colour: C' = 0.75 C + 1.75 e m m^T. At pixels that are r pixels apart, light is correlated by
+    exp(-r^2 / 2). Let S_y be the nine samples, of channels o_y, at distances r_y from the pixel. The best linear
+    estimate of the channels is
 
         E_c = m_c + sum_yz C'(c, o_y) exp(-r_y^2 / 2) [C'(o_y, o_z) exp(-r_yz^2 / 2) + N_y delta_yz]^-1 (S_z - m_o_z),
 
-    N_y = P(o_y, y) + s^2 the noise of a sample on its plane, without samples that are full. With chi^2 the mean of
-    their squared distances to planes over N_y, and chi_0^2 that weighted by exp(-2 r_y^2), it counts less where
-    contrast is a lamp's and the samples lie on their planes:
+    where N_y = P(o_y, y) + s^2 is the noise variance of a sample on its plane; full samples don't count. Let chi^2 be
+    the mean of the samples' squared distances from their planes over N_y, and chi_0^2 this mean with the weights
+    exp(-2 r_y^2). If contrast is that of a lamp and the samples lie on their planes, the estimate counts less:
 
         F = P + max(0, 1 - e^4 / (1 + chi_0^2)) (E - P).
 
-    Where E_W is brighter or darker than all P_W of the window, by d, d m / max(1, chi^2) over m_W, (nu_W N_W)^(1/2) at
-    least, is taken off E before: else noise makes dark pixels beside bright things. For a colour that noise hides that
-    of the surroundings stands,
+    Before this, if E_W is brighter or darker than all P_W of the window, by d, then d m / (m_W max(1, chi^2)) is
+    subtracted from E, because otherwise noise would make dark pixels beside bright things. Here m_W counts as at least
+    (nu_W N_W)^(1/2). A colour that noise hides is replaced by that of the surroundings,
 
-        F_c -= min(1, 5 / sum_c <D_c^2> / (nu_c N_c)) (A_c - r_c A_W),    A = P + max(0, 1 - e) (F - P),
+        F_c -= min(1, 5 / sum_c (<D_c^2> / (nu_c N_c))) (A_c - r_c A_W),    A = P + max(0, 1 - e) (F - P),
 
-    with 1 / nu_c the frame's mean of 1 / noise gain, r_c the ratio of channel c to W, (nu_W N_W)^(1/2) at least, in the
-    sum of 5 x 5 planes, 12 pixels apart, each by how like it is to m, exp(-1/2) where they differ by one sample's noise
-    in one channel, so that a lamp has no say, and <> the mean over the window, D_c = P_c - r_c P_W.
+    where 1 / nu_c is the frame's mean of 1 / noise gain, <> the mean over the window, and D_c = P_c - r_c P_W. r_c is
+    the ratio of channel c to W (at least (nu_W N_W)^(1/2)) in a weighted mean of the planes at 5 x 5 places that are 12
+    pixels apart. The more a place resembles m, the larger is its weight; where it differs by one sample's noise in one
+    channel, the weight is exp(-1/2). A lamp therefore hardly counts.
 
-    The colour of light isn't known where it fills less than half of a window on black, e > 1, as far as its planes miss
-    the samples or it lies between those of a channel, l = (n - 1.5 s) / m_W with n the mean of P_W over the nine pixels
-    and s the least of its means over the four lattices of every second pixel in the window; nor the light of a channel
-    of which one of the nine samples is full, q_c = 1; nor, as far as there is contrast, any hue where a colour is, q =
-    min(1, e), or W alone, q = min(1, e^4). Balanced by the gains g, channels rise to the brightest:
+    In three cases the colour of light isn't known:
+
+    - Light fills less than half of a window that is otherwise black, so that e > 1, and its planes miss the samples
+      (chi^2), or it lies between the samples of a channel (l). With the mean n of P_W over the nine pixels, and the
+      least mean b of P_W over one of the four lattices of every second pixel in the window, l = (n - 1.5 b) / m_W.
+    - One of the nine samples of a channel is full. The light of this channel isn't known: q_c = 1.
+    - One of the nine samples is full. Any hue is unknown as far as there is contrast: q = min(1, e) if the sample is a
+      colour's, and q = min(1, e^4) if only W is full.
+
+    Channels, balanced by the gains g, are then raised to the brightest one:
 
         F'_c = F_c + max((1 - 1 / e^2) min(1, max(chi^2 / 30, l)), q, q_c) (max_d g_d F_d / g_c - F_c).
 
-    Light that fills less than two fifths of the window, e > 1.5, and of which a plane averages few samples, is the
-    sample's own S, in the colour around: by the shares u of the surroundings (`.panchromatic`), or a neutral's where
-    S and a colour beside are full. With v = S / u_o, N_v its noise, and G the largest noise gain of a channel,
+    If light fills less than two fifths of the window, so that e > 1.5, and a plane averages only few samples of it, it
+    is estimated from the pixel's own sample S of channel o, in the colour around. That colour is the shares u of the
+    surroundings (`.panchromatic`), or a neutral's if S and a colour sample beside it are full. With v = S / u_o, its
+    noise variance N_v, and the largest noise gain G of a channel,
 
         F''_c = F'_c + min(1, 4 G) (1 - 1 / (1 + (e / 1.5)^4)) (L_c - F'_c),
 
         L_c = u_c (P_W + max(0, 1 - 9 N_v / (v - P_W)^2) (v - P_W)).
 
-    A wall beside a window has contrast as well, and yet many samples that tell its light.
+    A wall beside a window has contrast too, but its planes average many samples, so that G is small.
 
     Parameters
     ----------
@@ -98,11 +106,12 @@ def sharpen(
     gains : (4,) float64
         White balance.
     noise_gain : (h, w, 4) float
-        Of `isp.interleaved.reconstruction.reconstruct_with_noise`.
+        Noise gain of `isp.interleaved.reconstruction.reconstruct_with_noise`.
 
     Returns
     -------
     (h, w, 4) float32
+        R, G, B and W, F'' [e-].
     """
     raw = white.raw
     nu = 1.0 / (1.0 / np.maximum(noise_gain, TINY)).mean(axis=0).mean(axis=0)
@@ -178,7 +187,7 @@ def _sharpen(
     weights = np.linalg.solve(CORRELATION * among_samples + counted[..., None] * np.eye(9), residual[..., None])
     estimate = mean + ((CORRELATION[4] * to_samples) @ weights)[..., 0]
 
-    # E_W brighter or darker than all P_W of the window by d, only as far as the samples tell it from noise.
+    # If E_W is brighter or darker than all P_W of the window, by d, keep this only as far as it isn't noise.
     squares = (sample - value) ** 2 / sample_noise
     of_white = window[:, :, 3]
     within = np.clip(estimate[..., 3], of_white.min(axis=(2, 3)), of_white.max(axis=(2, 3)))
@@ -186,14 +195,14 @@ def _sharpen(
     seen = np.maximum(light[..., 3], np.sqrt(nu[3] * noise[..., 3]))
     estimate = estimate + (beyond / seen)[..., None] * light
 
-    # F: the estimate counts less where contrast is a lamp's and the samples lie on their planes.
+    # F: the estimate counts less if contrast is that of a lamp and the samples lie on their planes.
     sharp = plane + np.maximum(1.0 - contrast**4 / (1.0 + squares @ NEAR[:, None]), 0.0) * (estimate - plane)
 
-    # F_c less A_c - r_c A_W: a colour that noise hides is the surroundings'.
+    # F_c minus A_c - r_c A_W: a colour that noise hides is replaced by that of the surroundings.
     even = plane + np.maximum(1.0 - contrast, 0.0) * (sharp - plane)
     sharp -= hidden * (even - tint * even[..., 3:])
 
-    # F': light of unknown colour; q is `hue`, q_c is 1 where `full`, and l is `between`.
+    # F': light of unknown colour; `hue` is q or the first case, q_c is 1 where `full`, and l is `between`.
     full = (is_full[..., None] & (site[..., None] == np.arange(4))).any(axis=2)
     lit = np.maximum(of_white, 0.0)
     least = np.min([lit[..., i::2, j::2].mean(axis=(2, 3)) for i in (0, 1) for j in (0, 1)], axis=0)
@@ -205,7 +214,7 @@ def _sharpen(
     unknown = np.where(full, 1.0, hue)
     sharp += unknown * ((sharp * gains).max(axis=2, keepdims=True) / gains - sharp)
 
-    # F'': light that fills less than two fifths of the window is the sample's own, in the colour around; L is `small`.
+    # F'': light that fills less than two fifths of the window, from the pixel's own sample; L is `small`.
     no_hue = is_full[..., 4] & (is_full & (site != 3)).any(axis=2)
     shares = np.where(no_hue[..., None], gains[3] / gains, shares)
     own = np.take_along_axis(shares, site[..., 4:5], axis=2)[..., 0]

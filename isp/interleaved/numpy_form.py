@@ -9,8 +9,8 @@ g_i(y) in the neighbourhood Omega of x, where S_i(y) is 1 at the sites of i and 
     beta_d = ||x - y||,                                                                             (4)
     beta_s = alpha(y) ||h_i(x) - h_i(y)|| + (1 - alpha(y)) ||h_W(x) - h_W(y)||,                     (5)
 
-with h_i(x) the patch around x of channel i's filled plane, and alpha of eq. (6) (`isp.interleaved.saturation`). With
-one guide for all channels h is that guide's patch, and alpha is 0.
+where h_i(x) is the patch around x in channel i's filled plane, and alpha comes from eq. (6)
+(`isp.interleaved.saturation`). If one guide serves all channels, h is that guide's patch, and alpha is 0.
 
 This form is slow and plain. The kernel is tested against it, and it runs where Dr.Jit can't.
 """
@@ -51,7 +51,7 @@ class ReferenceSums:
 
     largest: Plane  # logarithm of the largest weight G G so far
     weight: Plane  # sum of G G S_i, W_y of eq. (3)
-    square: Plane  # sum of (G G S_i)^2: over W_y^2 the noise gain
+    square: Plane  # sum of (G G S_i)^2, which is the noise gain once it is divided by W_y^2
     value: Plane  # sum of G G S_i g_i, of eq. (1)
 
 

@@ -1,10 +1,10 @@
-"""Every sample read as W, which gives one guide for all channels, and each channel's share of W around a pixel.
+"""Conversion of every sample to what W would read there, which gives one plane that guides all channels.
 
 A channel's own plane is made of its samples alone, one pixel in four, and its edges fall on other pixels than those of
-the other channels. Yet light and shade are common to all channels. Therefore a sample S of channel o, divided by the
-ratio r_o of that channel to W around it, tells what W would read there: v = S / r_o
-(docs/decisions/0057-every-sample-as-w.md). In a mosaic without W, the unit channel (`sensor.cfa.unit_channel`) stands
-for W.
+the other channels. Yet light and shade are common to all channels. Therefore a sample S of channel o is divided by the
+ratio r_o of that channel to W around the pixel. The result v = S / r_o is what W would read
+(docs/decisions/0057-every-sample-as-w.md). In a mosaic without W, the unit channel (`sensor.cfa.unit_channel`) is used
+in its place.
 """
 
 from dataclasses import replace
@@ -35,36 +35,37 @@ from sensor.raw import RawImage
 
 
 def white_channel(raw: RawImage) -> str:
-    """Return the channel that stands for W: W itself, or the mosaic's unit."""
+    """Return the channel that is used as W: W itself, or the mosaic's unit channel."""
     return "W" if "W" in raw.channels else raw.unit_channel
 
 
 def read_as_white(raw: RawImage, neutral: Floats) -> WhiteReading:
     """Read every sample of a frame as W.
 
-    With n_c a neutral's electrons of channel c per electron of W, s_W the dark noise of W, tent the [1 2 1] mean of
-    3 x 3 pixels (wider where a tile is larger, so that it takes all channels alike), and <> means over the channel's
-    samples in 3 x 3 tiles, a sample S of channel o is taken beside the light around it, so that a lamp has no more say
-    than any other pixel:
+    Let n_c be a neutral's electrons in channel c per electron of W, and s_W the dark noise of W. Let tent be the mean
+    over 3 x 3 pixels with the weights [1 2 1] (wider for larger tiles, so that all cells weigh the same), and <>_c the
+    mean over channel c's samples in 3 x 3 tiles (7 x 7 tiles of one pixel). A sample S of channel o is divided by the
+    light around it, so that a lamp has no more influence than any other pixel:
 
         x = S / max(tent(S / n_o), 12 s_W),    m_c = <x>_c,    s_c^2 = (<x^2>_c - m_c^2) / samples.
 
-    A lamp's line misses whole channels, for which s_c^2 gets e^3 m_c^2 / samples, e the relative variance of S / n_o in
-    the window. The share m_c / m_W is trusted as far as s_c allows. Beyond that the surroundings' share q_c = f_c / f_W
-    stands, f the mean of m at 5 x 5 places 6 pixels apart: with a_c = m_c - q_c m_W,
+    A thin bright line misses the sites of whole channels. Therefore s_c^2 is increased by e^3 m_c^2 / samples, where e
+    is the relative variance of S / n_o in the window. The share m_c / m_W is used as far as it is certain by s_c, and
+    for the rest the share q_c = f_c / f_W of the surroundings, where f is the mean of m at 5 x 5 places that are 6
+    pixels apart. With a_c = m_c - q_c m_W,
 
         m_c -= a_c min(1, 1 / chi^2),    chi^2 = sum_c a_c^2 / (s_c^2 + q_c^2 s_W^2).
 
-    Where W is under 0.3, light is too faint to have a colour: f and m get a neutral's, (0.3 - m_W) n_c. So
-    r_c = m_c / m_W, 0.02 n_c at least.
+    Where m_W is below 0.3, light is too faint to show a colour. Therefore a neutral's (0.3 - m_W) n_c is added to m_c,
+    and likewise to f_c. The ratio is then r_c = m_c / m_W, but at least 0.02 n_c.
 
-    The guide weighs the sample's own word v = S / r_o, with the variance N = (k_o L + s_o^2 / r_o) / r_o at light L,
-    k_o being 1 where a channel counts every electron,
-    and the tent-weighted mean t of the eight around it, by their noise, of variance T:
+    The guide is a weighted mean of v = S / r_o and of t. At light L, v has the variance
+    N = (k_o L + s_o^2 / r_o) / r_o, where k_o is the variance of shot noise per electron, which is 1 in most channels.
+    t is the mean of v over the eight samples around, weighted by the tent and by 1 / N, and T is its variance:
 
         g = t + (D + T) / (D + T + N) (v - t),    D = max(0, <(v - t)^2 / (N + T)> - 1) / <1 / (N + T)>,
 
-    D the variance of detail that t misses, <> over 5 x 5 pixels.
+    where D is the variance of detail that t misses, and <> the mean over 5 x 5 pixels.
 
     Parameters
     ----------
@@ -82,9 +83,10 @@ def read_as_white(raw: RawImage, neutral: Floats) -> WhiteReading:
 
 
 def with_full_white(raw: RawImage, ratios: Floats) -> RawImage:
-    """Raise each full sample of W to a neutral's value by the colours around, n_W sum(t S) / sum(t n), if it is more.
+    """Raise each full sample of W to what W would read if the colour samples around were of a neutral, if that is more.
 
-    The tent t reaches one pixel less than the tile. Of light beyond the well only the colours tell.
+    Only the colours show how much light there is beyond W's well. With the colour samples S, n of `read_as_white`, and
+    a tent t that reaches one pixel less than the tile's side, the value is sum(t S) / sum(t n).
     """
     if not {"W", "G"} <= set(raw.channels):
         return raw
@@ -140,7 +142,7 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
         rows, columns = window_steps(down), window_steps(across)
         return _mean(np.moveaxis(sums, 0, -1), _comb(rows), _comb(columns)) * len(rows) * len(columns)
 
-    # Means over each channel's samples, and how far they can be wrong.
+    # Means over each channel's samples, and the variances of these means.
     neutral = electrons / ratios[site]
     light = _mean(neutral, *wide_tents)
     beside = electrons / np.maximum(light, FAINT * np.sqrt(dark[white]) + TINY)
@@ -152,7 +154,7 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
     contrast = np.maximum(mean_square / np.maximum(mean, np.sqrt(dark[white]) + TINY) ** 2 - 1.0, 0.0)
     error = (np.maximum(squares - means**2, 0.0) + contrast[..., None] ** 3 * means**2) / samples
 
-    # Shares: the window's, as far as its samples tell; else those of the surroundings.
+    # Shares: those of the window as far as its samples are certain, and for the rest those of the surroundings.
     far = np.maximum(_mean(means, _comb(surroundings_steps(down)), _comb(surroundings_steps(across))), 0.0)
     far += np.maximum(LEAST_LIGHT - far[..., white, None], 0.0) * ratios
     share = far / far[..., white, None]
@@ -163,7 +165,7 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
     shares = np.maximum(means / means[..., white, None], LEAST_SHARE * ratios)
     surroundings = np.maximum(share, LEAST_SHARE * ratios)
 
-    # The sample's own word v, and t, that of the eight around it.
+    # v of the sample itself, and t, the mean of v over the eight samples around it.
     own = np.take_along_axis(at_pixels(shares, raw), site[..., None], axis=-1)[..., 0]
     value = electrons / own
 
@@ -185,6 +187,6 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
 
 
 def at_pixels(shares: NDArray[np.floating], raw: RawImage) -> NDArray[Any]:
-    """Repeat shares by tile for every pixel, (h, w, channel)."""
+    """Repeat the shares of each tile for all its pixels, shape (h, w, channel)."""
     repeated = shares.repeat(len(raw.cfa), axis=0).repeat(len(raw.cfa[0]), axis=1)
     return repeated[: raw.shape[0], : raw.shape[1]]

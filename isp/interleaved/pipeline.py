@@ -86,7 +86,7 @@ def picture_interleaved_paper(
     weight = float(substitution_weight(snr, substitution_snr) > 0.5)
     balanced = clip_highlights(raw, result.estimate * gains, gains)
 
-    # By the share of saturated pixels around, eq. (6), W is left out of the colours as it is out of the similarity.
+    # Alpha of eq. (6), the share of saturated pixels around, is also the share in which W is left out of the colours.
     rgb = balanced @ matrix_with_white(colours, noise, weight).T
     alpha = saturated_fraction(raw, settings.patch)
     mixed = alpha > 0.0

@@ -14,8 +14,8 @@ The reconstruction's limits, all of them (log weights and exponents are logarith
 | LOWEST_LOG_WEIGHT      | -1e28  | under any log weight of a sample: sigmas of 0.001 and 16 bits give -1e15           |
 | NO_LOG_WEIGHT          | -1e29  | under LOWEST_LOG_WEIGHT: the largest log weight before the first sample            |
 | OUTSIDE                | 1e13   | 10^4 times a billion electrons, yet its square is finite: h_i outside the frame    |
-| LEAST_INVERSE_VARIANCE | 2e-24  | times OUTSIDE^2 2^-200, so that a sample outside the frame never counts; and small |
-|                        |        | enough for 25 squares of a billion electrons to count as similar (2^-0.00005)      |
+| LEAST_INVERSE_VARIANCE | 2e-24  | so large that OUTSIDE^2 gives the weight 2^-200, which never counts, and so small  |
+|                        |        | that 25 squares of a billion electrons count as similar (weight 2^-0.00005)        |
 | ROOT_SCALE             | 2^-32  | so small that the product of two scaled squared distances is finite                |
 """
 
@@ -35,7 +35,7 @@ ROOT_SCALE = 2.0**-32
 # difference. With a fourth power the kernel would take a tenth longer.
 EXP2 = (0.99992522, 0.69583354, 0.22606716, 0.07802452)
 
-Sums = tuple[Float, ...]  # of the weights, of weight times sample, of the squared weights[, largest log weight so far]
+Sums = tuple[Float, ...]  # sums of weights, of weight times sample, of squared weights[, largest log weight so far]
 
 
 def start_sums(running: bool) -> tuple[float, ...]:
@@ -46,9 +46,9 @@ def start_sums(running: bool) -> tuple[float, ...]:
 def add_samples(
     sums: list[Sums], log_weights: list[Float], samples: list[Float], brightest: list[Float], *, running: bool
 ) -> list[Sums]:
-    """Add one sample to each pixel's sums; at a fixed scale the log weights have HEADROOM added.
+    """Add one sample to each pixel's sums; samples over `brightest` don't count.
 
-    Samples over `brightest` don't count.
+    At the fixed scale the given log weights already include HEADROOM.
     """
     add = _add_to_running_maximum if running else _add_at_fixed_scale
     return [add(*pixel) for pixel in zip(sums, log_weights, samples, brightest, strict=True)]
@@ -93,7 +93,7 @@ def _sum(values: list[Float] | dict[int, Float], first: int, count: int) -> Floa
 
 
 def larger(a: Float, b: Float) -> Float:
-    """Return the larger one; `dr.maximum` takes three instructions, because it handles NaN."""
+    """Return the larger number; `dr.maximum` takes three instructions, because it handles NaN."""
     return dr.select(a > b, a, b)
 
 

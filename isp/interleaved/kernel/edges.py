@@ -19,8 +19,8 @@ Packet: TypeAlias = Any  # four values of a pixel, one per channel
 
 REACH = 2  # pixels of a window to either side; 3 would gain 0.02 dB
 SIDE = 2 * REACH + 1
-# a and b of C' = a C + b e m m^T. 2.5 and 0 lose 0.6 dB, 0 and 2.5 lose 0.1; 0.3 and 0.7 lose 0.2, twice both gains 0.1
-# and makes flats noisier.
+# a and b of C' = a C + b e m m^T. 2.5 and 0 lose 0.6 dB, 0 and 2.5 lose 0.1; 0.3 and 0.7 lose 0.2; doubling both
+# gains 0.1 and makes even surfaces noisier.
 SPREAD = 0.75, 1.75
 FULL = 0.95  # share of the well from which on there may be more light than was read
 # chi^2 of planes that miss a lamp. With 10, windows get a grey ring; with 100, lamps of 5x2 pixels get a red one.
@@ -29,7 +29,7 @@ FAR = 24  # distance [pixels] to either side within which the surroundings' colo
 STEP = 12  # distance [pixels] between the 5 x 5 places at which it is found
 # chi^2 of a colour up to which noise hides it. With 3, coloured clouds remain in the dark; with 9, charts get paler.
 HIDDEN = 5.0
-APART = 9.0  # squared standard deviations by which a sample has to differ from its plane
+APART = 9.0  # squared standard deviations of noise by which a sample has to differ from W's plane to count by itself
 # Contrast from which on a light is small. With 1, edges of windows show the tile; with 2, halos of lamps have 15 % more
 # false hues.
 SMALL = 1.5
@@ -54,7 +54,7 @@ def channel_noise(raw: RawImage) -> NDArray[np.float64]:
 def sharpen_frame(
     white: WhiteReading, planes: NDArray[Any], noise_gain: NDArray[Any], scales: Floats
 ) -> NDArray[np.float32]:
-    """Sharpen a frame as `isp.interleaved.edges.sharpen` does, by whose symbols `scales` are g and nu, (2, 4)."""
+    """Sharpen a frame like `isp.interleaved.edges.sharpen`; `scales` (2, 4) holds g and nu of its formulas."""
     jit = arrays()
     raw = white.raw
     names, (height, width) = raw.channels, raw.shape
@@ -115,31 +115,31 @@ def sharpen_frame(
     terms = [float(CORRELATION[4, y]) * weights[y] * to_samples[y] for y in range(9)]
     estimate = mean + sum(terms[1:], terms[0])
 
-    # Brighter or darker than all planes of the window only as far as the samples tell it from noise.
+    # If W's estimate is brighter or darker than all its planes in the window, keep this only as far as it isn't noise.
     squares = [dr.square(e - v) / n for e, v, n in zip(sample, value, sample_noise, strict=True)]
     chi_squared = sum(squares[1:], squares[0]) / 9.0
     of_white = [values[3] for values in window]
     within = larger(dr.minimum(estimate[3], reduce(larger, of_white)), reduce(dr.minimum, of_white))
     estimate += (within - estimate[3]) / larger(chi_squared, 1.0) * light / larger(light[3], faint)
 
-    # Where contrast is a lamp's and the samples lie on their planes, the estimate counts less.
+    # The estimate counts less if contrast is that of a lamp and the samples lie on their planes.
     chi_squared_near = sum((float(w) * x for w, x in zip(NEAR, squares, strict=True)), 0.0)
     sharp = plane + larger(1.0 - dr.square(dr.square(contrast)) / (1.0 + chi_squared_near), 0.0) * (estimate - plane)
 
-    # A colour that noise hides is the surroundings'.
+    # A colour that noise hides is replaced by that of the surroundings.
     even = plane + larger(1.0 - contrast, 0.0) * (sharp - plane)
     sharp -= hidden * (even - tint * even[3])
 
     # Light of unknown colour: q (hue) and q_c. W is channel 3.
     channels_full = [dr.select(f, jit.UInt(1) << s, 0) for f, s in zip(is_full, site, strict=True)]
-    full = reduce(or_, channels_full)  # a bit a channel
+    full = reduce(or_, channels_full)  # one bit per channel
     lamp = _lamp(of_white, light[3], contrast, chi_squared)
     black = dr.minimum(contrast, 1.0)
     hue = dr.select((full & 0b111) > 0, black, dr.select(full > 0, dr.square(dr.square(black)), lamp))
     unknown = jit.Array4f([dr.select((full & 1 << c) > 0, 1.0, hue) for c in range(4)])
     sharp += unknown * (reduce(larger, [*(sharp * balance)]) / balance - sharp)
 
-    # Light that fills less than two fifths of the window: the sample's own, in the colour around.
+    # Light that fills less than two fifths of the window is taken from the pixel's own sample, in the colour around.
     no_hue = is_full[4] & ((full & 0b111) > 0)
     tile_row, tile_column = (divide(line, divisor(int(size)))[0] for line, size in ((row, down), (column, across)))
     of_tile = tile_row * dr.opaque(jit.UInt, white.shares.shape[1]) + tile_column
@@ -180,7 +180,7 @@ def _tint_of_like_places(mean: Packet, far: list[Packet], shot: Packet, dark: Pa
 
 
 def _lamp(white: list[Float], light: Float, contrast: Float, chi_squared: Float) -> Float:
-    """Estimate to which degree a lamp's colour is unknown, from the planes of W in its window and their mean."""
+    """Estimate to which degree the colour of a lamp is unknown, 0 to 1, from W's plane in the window and its mean."""
     lines = [[larger(value, 0.0) for value in white[i : i + SIDE]] for i in range(0, SIDE**2, SIDE)]
     lattices = [[w for line in lines[i::2] for w in line[j::2]] for i, j in product((0, 1), repeat=2)]
     least = reduce(dr.minimum, [sum(x[1:], x[0]) / len(x) for x in lattices])
@@ -207,7 +207,7 @@ def _own_light(sample: Float, share: Float, of_white: Float, noise: tuple[Float,
 
 
 def at_site(values: list[Float], site: UInt) -> Float:
-    """Return that one of four values whose number is `site`."""
+    """Return the value whose index is `site`, thread by thread."""
     *rest, result = values
     for number, value in enumerate(rest):
         result = dr.select(site == number, value, result)

@@ -1,7 +1,8 @@
 """Eqs. (1) to (5) for one thread's block of pixels, in Dr.Jit for LLVM and CUDA.
 
-With a shared guide, a thread owns all pixels of its block and reads one plane. Otherwise it owns those whose y lie at
-one cell of the tile, and reads the plane of the channel there. Therefore one compiled kernel serves all phases and
+Here x is a pixel to reconstruct, and y = x + d the pixel of a sample. With a shared guide, a thread owns all x of its
+block and reads one plane. Otherwise it owns those whose y lie at one cell of the tile, and reads the plane of the
+channel there. Therefore one compiled kernel serves all phases and
 cells, and all mosaics with a tile of this size. Most of the time is spent on loading, so that at y whole rows are
 loaded, each as a packet (`isp.interleaved.kernel.layout`).
 """
@@ -95,12 +96,12 @@ def launch(jit: ModuleType, inputs: Inputs, threads: Threads, shape: Shape, sums
     planes = {"shared": [inputs.white], "channel": [x_plane], "mixed": [x_plane, inputs.white]}[shape.guide]
     first_packets = [plane * inputs.plane_packets for plane in planes]
     pair, step = inputs.packet_rows, inputs.packet_columns
-    lines = sorted({i // pair for i in window})  # of packets
+    lines = sorted({i // pair for i in window})  # rows of packets
     below = {line: line * inputs.row_packets for line in lines}
-    # x as y is counted, in packets: (row + a) / pair, (column + b) / step for phase (a, b), whole numbers
+    # Address of x in packets, as for y: (row + a) / pair, (column + b) / step for phase (a, b), whole numbers
     a, b = threads.phase // across % pair, threads.phase % step
     x_packet = jit.UInt(x_row + a) // pair * inputs.row_packets + jit.UInt(x_column + b) // step
-    offsets = jit.UInt(threads.phase)  # a list a phase
+    offsets = jit.UInt(threads.phase)  # one list per phase
     first_entry = offsets * inputs.length
     entries = dr.gather(jit.UInt, inputs.counts, offsets)
 
@@ -130,7 +131,7 @@ def launch(jit: ModuleType, inputs: Inputs, threads: Threads, shape: Shape, sums
     def add_offset(k: UInt, totals: list[Sums]) -> tuple[UInt, list[Sums]]:
         """Add the samples at y = x + d for offset k of the list."""
         steps, log_spatial = load(inputs.entries, first_entry + k, inputs.entry_values, 2)
-        y = x_packet + dr.reinterpret_array(jit.UInt, steps)  # packet
+        y = x_packet + dr.reinterpret_array(jit.UInt, steps)  # number of its packet
         distances = list[list[Float]]()
         samples = dict[int, list[Float]]()
         for n, (first_packet, patches) in enumerate(zip(first_packets, patches_at_x, strict=True)):

@@ -276,7 +276,7 @@ def _surroundings(
     margin = settings.patch // 2 + 2 * max(pattern.tile)
     rows, columns = (
         slice(max(first - margin, 0) // size * size, min(last + margin, length))
-        for (first, last), size, length in zip(spans, pattern.tile, shape, strict=True)  # with the frame's phase
+        for (first, last), size, length in zip(spans, pattern.tile, shape, strict=True)  # begins with a whole tile
     )
     return rows, columns
 

@@ -22,7 +22,7 @@ from sensor.raw import RawImage
 
 WINDOW_PX = 6  # side of the window over which a channel's share is averaged, at least three tiles
 APART_PX = 6  # distance between the 5 x 5 windows of the surroundings
-DETAIL_PX = 5  # side of the window over which detail is told from noise
+DETAIL_PX = 5  # side of the window over which detail is distinguished from noise
 FAINT = 12.0  # light, in units of W's dark noise, below which samples say nothing about colour
 LEAST_LIGHT = 0.3  # value of m_W, which is about 1 in good light, below which colours approach a neutral
 LEAST_SHARE = 0.02  # least share of a channel in W, as a fraction of a neutral's share
@@ -58,8 +58,9 @@ class Grid:
     row, column : UInt
         Position of each thread.
     row_starts, columns : UInt
-        Address at which each row and each column starts, from `margin` before the first one on.
+        Address of each row and each column, from `margin` lines before the first one on.
     margin, size : int
+        Lines of mirrored neighbours on each side, and number of threads.
     """
 
     row: UInt
@@ -103,7 +104,7 @@ def _grid(height: int, width: int, margin: int) -> Grid:
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame with what its guide is computed from.
+    """A frame and the numbers from which its guide is computed.
 
     Attributes
     ----------
@@ -111,7 +112,7 @@ class Frame:
     cells : list of int
         Number of the channel at each cell of the tile, row by row.
     white : int
-        Number of the channel that stands for W.
+        Number of the channel that is used as W.
     ratios : (channel,) float64
         A neutral's electrons per electron of W.
     """
@@ -166,7 +167,7 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     cells = upload(np.array(frame.cells, np.uint32))
     site = dr.gather(jit.UInt, cells, tile_row[1] * np.uint32(across) + tile_column[1])
 
-    # Compute samples as a neutral's light, and relative to the light around.
+    # Compute samples as if light were neutral (divided by n_o), and samples relative to the light around.
     neutral = opaque(frame.ratios)
     plain = electrons / at_site(neutral, site)
     dr.eval(plain, site)
@@ -179,7 +180,7 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     tiles = _grid(-(-height // down), -(-width // across), max(*surroundings_steps(down), *surroundings_steps(across)))
     shares, around = _shares(frame, tiles, (height, width), samples, float(dark[frame.white]))
 
-    # Compute v, what the sample itself says of W, and its weight.
+    # Compute v, which is W by the sample itself, and its weight.
     of_tile = tile_row[0] * dr.opaque(jit.UInt, -(-width // across)) + tile_column[0]
     own = at_site(pixels.load(shares, [of_tile], len(frame.ratios))[0], site)
     shots, darks = at_site(opaque(shot), site), at_site(opaque(dark), site)
@@ -215,9 +216,10 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
 
 
 def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Float, dark: float) -> tuple[Float, Float]:
-    """Compute shares by tile, those of the window and those of the surroundings.
+    """Compute shares per tile, those of the window and those of the surroundings.
 
-    `samples` hold each pixel's sample as a neutral's light, and relative to the light around.
+    `samples` holds each pixel's sample as if light were neutral, and relative to the light around. `shape` is the size
+    of the band [pixels], and `dark` the variance of W's dark noise [e-^2].
     """
     jit = arrays()
     count = len(frame.ratios)
@@ -253,7 +255,7 @@ def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Float, d
     white = frame.white
     mean_planes, error_planes = tiles.store(*means), tiles.store(*error)
 
-    # Take the window's shares as far as its samples tell them, otherwise those of the surroundings.
+    # Use the window's shares as far as its samples are certain, and for the rest those of the surroundings.
     rows, columns = surroundings_steps(down), surroundings_steps(across)
     lines = tiles.store(*_sums(tiles.load(mean_planes, tiles.around([0], columns), count)))
     far = _sums(tiles.load(lines, tiles.around(rows, [0]), count))
@@ -273,7 +275,7 @@ def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Float, d
 
 
 def _lifted(means: Numbers, neutral: Numbers, white: int) -> Numbers:
-    """Add to the channels' means as much of a neutral as W lacks to `LEAST_LIGHT`."""
+    """Add so much of a neutral to the channels' means that W's mean is at least `LEAST_LIGHT`."""
     missing = larger(LEAST_LIGHT - means[white], 0.0)
     return [mean + missing * n for mean, n in zip(means, neutral, strict=True)]
 
