@@ -24,8 +24,9 @@ def picture_any_mosaic(
 ) -> Picture:
     """Develop a raw image of any mosaic: eqs. (1)-(5), Gray World, and a noise-aware matrix over all channels.
 
-    With three channels or more the picture has colours as far as these tell them; with one or two it is a grey picture
-    of luminance. Every sample guides the similarity, read as W or as the mosaic's unit, such as C of RCCB.
+    With three channels or more the picture has colours, as far as the channels distinguish them; with one or two it is
+    a grey picture of luminance. Every sample guides the similarity, once it is converted to W or to the mosaic's unit
+    channel, such as C of RCCB.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def picture_any_mosaic(
     Returns
     -------
     Picture
-        A neutral has the electrons of `sensor.cfa.unit_channel`.
+        Picture in which a neutral has the electrons of `sensor.cfa.unit_channel`.
     """
     if mosaic is not None:
         require_letters(raw, channels(tile_of(mosaic)))
@@ -59,7 +60,7 @@ def rgb_of_channels(raw: RawImage, balanced: Plane, colours: ColourFit, noise: F
     names = raw.channels
     if colours.plain is None:
         return np.asarray(balanced @ colours.matrix(names, noise).T)
-    # A plain matrix takes three colours, and doesn't take noise into account.
+    # A plain matrix is applied to three colours, and doesn't depend on noise.
     unit = names.index(raw.unit_channel)
     three = balanced[..., :3] if len(names) >= 3 else np.repeat(balanced[..., unit : unit + 1], 3, axis=-1)
     return np.asarray(three @ colours.plain.T)

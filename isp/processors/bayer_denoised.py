@@ -2,8 +2,8 @@
 
 Before demosaicking, BM3D denoises the mosaic's sub-images (`isp.processors.sub_images`). Q. Jin, G. Facciolo, J.-M.
 Morel, "A review of an old dilemma: demosaicking first, or denoising first?", CVPR Workshops 2020, find the other order
-better: the demosaicked picture is denoised as if its noise were white and stronger, in their paper 1.5 times. This
-project takes 1.75 times the mosaic's noise.
+better: the demosaicked picture is denoised as if its noise were white and stronger than the mosaic's, by 1.5 times in
+their paper and by 1.75 times here.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,16 +24,17 @@ from sensor.raw import RawImage
 
 Demosaic = Callable[[Plane, Tile], Image]
 Denoise = Callable[[Image, Sequence[float]], Image]  # takes planes and the standard deviation of each plane's noise
-# Noise that BM3D is told after demosaicking, over the mosaic's noise (docs/decisions/0039-the-strongest-opponents.md).
+# Noise that BM3D assumes after demosaicking, over the mosaic's noise (docs/decisions/0039-the-strongest-opponents.md).
 NOISE_AFTER_DEMOSAICKING = 1.75
 # Orthonormal rows that turn R, G and B into their mean and two differences.
 OPPONENT = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6]])
 
 
 def picture_bayer_nlm(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
-    """Develop a Bayer raw image with `isp.interleaved.reconstruction.reconstruct`; every sample, read as green, guides.
+    """Develop a Bayer raw image with `isp.interleaved.reconstruction.reconstruct`.
 
-    The colour matrix is noise-aware, as in the interleaved camera.
+    Every sample, converted to green, guides the similarity. The colour matrix is noise-aware, as in the interleaved
+    camera.
     """
     require_bayer(raw.cfa)
     result = reconstruct_with_noise(raw, neutral=balance.expected(raw))
@@ -54,8 +55,9 @@ def picture_demosaicked_first(
 ) -> Picture:
     """Develop a Bayer raw image by demosaicking its noisy mosaic, followed by BM3D, another denoiser or none.
 
-    A balanced channel of gain g has sqrt(g) times the noise. Stabilised samples are scaled by it, so that except for
-    dark noise a neutral has equal samples in all channels, as demosaicking presupposes.
+    At one level of light, a balanced channel of gain g has sqrt(g) times the shot noise of green. Stabilised samples
+    are multiplied by sqrt(g), so that except for dark noise a neutral has equal samples in all channels, which
+    demosaicking presupposes.
     """
     require_bayer(raw.cfa)
     mosaic, gains, sources = balance_mosaic(raw, raw.electrons, balance)

@@ -59,7 +59,7 @@ def picture_demosaicked(
     demosaic: Callable[[Plane, Tile], Image],
     electrons: Mosaic | None = None,
 ) -> Picture:
-    """Balance a Bayer raw image's mosaic, or a denoised one [e-], demosaic it and develop the picture."""
+    """Balance and demosaic a Bayer raw image, or its denoised mosaic `electrons` [e-], and develop the picture."""
     require_bayer(raw.cfa)
     mosaic, gains, sources = balance_mosaic(raw, raw.electrons if electrons is None else electrons, balance)
     return Picture(to_rgb(raw, demosaic(mosaic, raw.cfa), gains, colours, MALVAR_REACH), sources)

@@ -1,16 +1,16 @@
 """RGBW prior art that uses W's samples as luminance: Sato 1983, Yamagami 1994, Kijima 2007.
 
-Sato: I. Sato et al., "Color image pick-up apparatus", US patent 4 390 895, 1983. From it are the elements for luminance
-at every other place in both directions, whose signal, with its high frequencies, is the picture's luminance; colour
-comes from the other elements.
+Sato: I. Sato et al., "Color image pick-up apparatus", US patent 4 390 895, 1983. It has elements for luminance at every
+other place in both directions. Their signal, with its high frequencies, is the picture's luminance; colour comes from
+the other elements.
 
 Yamagami: T. Yamagami et al., 1994, as Parmar & Wandell 2009 cite it (to our knowledge US patent 5 323 233, whose text
-could not be consulted). From their account are luminance and colour differences, and sensitivities that are matched by
-a neutral density in front of W or by complementary filters (`sensor.curves`), so that W doesn't saturate first.
+could not be consulted). By their account it combines luminance with colour differences, and matches the sensitivities
+by a neutral density in front of W or by complementary filters (`sensor.curves`), so that W doesn't saturate first.
 
 Kijima: T. Kijima et al., "Image sensor with improved light sensitivity", US patent application 11/341 210, 2006
-(published 2007). From it are a picture of W in full resolution and a picture of the colours in lower resolution, which
-are then fused. Samples of one colour are combined until they gather about as much light as W does.
+(published 2007). It makes a picture of W in full resolution and a picture of the colours in lower resolution, and fuses
+them. Samples of one colour are combined until they gather about as much light as W does.
 
 In all three, white balance before, interpolation by normalised convolution, the conversion to linear sRGB and the
 treatment of highlights are this project's. None of the three handles a saturated W: luminance ends at W's full well.
@@ -35,8 +35,8 @@ from sensor.cfa import Tile, channels, mask
 from sensor.curves import complementary, matched_transmittance, rgbw
 from sensor.raw import RawImage, renamed
 
-# A tent of 7 pixels over samples 2 apart averages like 7.1 of them, (8^2 / 24)^2; W gathers 6 to 10 times a colour's
-# light.
+# Radius of the tent that averages colours. Its 7 x 7 pixels hold samples 2 pixels apart, whose weighted mean has the
+# noise of a plain mean of 7.1 samples, (8^2 / 24)^2. W gathers 6 to 10 times the light of a colour.
 MATCHED_RADIUS = 3
 CHANNELS = ("R", "G", "B", "W")
 # Names under which the complementary channels are processed: yellow, the brightest, as green, the picture's unit.
@@ -52,9 +52,9 @@ def picture_sato(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) ->
 
 
 def picture_yamagami(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
-    """Develop an RGBW raw image whose W is behind a neutral density: W's luminance, low-passed colour differences.
+    """Develop an RGBW raw image with a neutral density over W, by W's luminance and low-passed colour differences.
 
-    The default neutral takes the density of `sensor.curves` into account.
+    The default neutral includes the density of `sensor.curves`.
     """
     require_letters(raw, CHANNELS)
     if balance.neutral is None:

@@ -51,5 +51,8 @@ def balance_mosaic(
 
 
 def to_rgb(raw: RawImage, planes: Image, gains: Floats, colours: ColourFit, reach: int) -> Image:
-    """Convert balanced planes of three colours, made by a filter of given reach, to linear sRGB: highlights, matrix."""
+    """Limit highlights of balanced planes of three colours, and convert the planes to linear sRGB.
+
+    `reach` is the reach of the filter that made the planes [pixels].
+    """
     return np.asarray(clip_highlights(raw, planes, gains, reach) @ colours.matrix().T)

