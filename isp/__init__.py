@@ -1,3 +1,3 @@
 """Development of raw data to a picture: the interleaved camera of Parmar & Wandell 2009, piecewise linear estimation,
-and the processors they are compared with.
+and the processors with which both are compared.
 """

@@ -11,9 +11,9 @@ from sensor.calibration import ChannelNoise, NoiseStep
 from sensor.cfa import mask
 from sensor.raw import RawImage, gains_shot
 
-# A smaller PRNU adds less than 1 % to shot noise up to a million electrons, and ln(1 + p) loses its digits.
+# A smaller PRNU counts as 0: it adds less than 1 % to shot noise up to a million electrons, and ln(1 + p) loses digits.
 LEAST_PRNU = 1e-4
-_LEAST = 2.0 * np.sqrt(0.375)  # the Anscombe transform of 0 electrons, smaller values are raised to it
+_LEAST = 2.0 * np.sqrt(0.375)  # the Anscombe transform of 0 electrons, to which smaller values are raised
 
 
 def stabilise(electrons: NDArray[np.floating], dark_noise_e: float, prnu: float) -> NDArray[Any]:
@@ -24,7 +24,7 @@ def stabilise(electrons: NDArray[np.floating], dark_noise_e: float, prnu: float)
         t = ln(1 + 2 p sqrt(v) + 2 p^2 e') / p,    e' = e + 3/8,    v = s^2 + e' + (p e')^2
 
     which for p -> 0 is 2 sqrt(e + 3/8 + s^2) (Murtagh, Starck & Bijaoui 1995, eq. 7) minus a constant. From a few
-    electrons on, the standard deviation of t is 1. Where e' is negative, PRNU is left out; below -s^2, t stays 0.
+    electrons on, the standard deviation of t is 1. Where e' is negative, PRNU is left out; below -s^2, t is 0.
 
     Parameters
     ----------
@@ -50,11 +50,11 @@ def stabilise(electrons: NDArray[np.floating], dark_noise_e: float, prnu: float)
 def stabilise_raw(electrons: NDArray[np.floating], raw: RawImage) -> NDArray[Any]:
     """Apply `stabilise` with the noise of a raw image, which has steps if pixels were read several times.
 
-    From a step on, the variance is k e + s^2 + (p e)^2 with other k, s and p. Its integral is the transform at k e with
-    PRNU p / k, divided by k. Each piece is shifted so that it meets the one before. A channel with its own readings
-    counts e / k electrons at its sites, to which the transform applies as to any others. The same holds if columns'
-    gains also act on dark current, which changes k from 1 (`sensor.raw.gains_shot`): the variance
-    k e + s^2 + (p e)^2 is k^2 times that of e / k.
+    From each step on, the variance is k e + s^2 + (p e)^2 with other k, s and p. Its integral is the transform at k e
+    with PRNU p / k, divided by k. Each piece is shifted so that it meets the piece below. A channel with its own
+    readings has its own k. The transform is applied to its counted electrons e / k, whose variance has the form above
+    with k = 1. The same is done if columns' gains also act on dark current, so that k isn't 1
+    (`sensor.raw.gains_shot`).
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def _electrons(stable: NDArray[np.floating], noise: ChannelNoise) -> NDArray[np.
 
 
 def _joined(raw: RawImage) -> list[tuple[NoiseStep, float]]:
-    """Return a raw image's noise steps, each with the offset by which its piece of the transform joins the last."""
+    """Return a raw image's noise steps, each with the offset that joins its piece of the transform to that below."""
     joined: list[tuple[NoiseStep, float]] = []
     both = gains_shot(raw, raw.dark_current_e)
     below = partial(_counted, noise=raw.plain_noise)
@@ -126,8 +126,8 @@ def without_prnu(raw: RawImage) -> RawImage:
 def unstabilise_raw(stable: NDArray[np.floating], raw: RawImage) -> NDArray[np.float64]:
     """Invert `stabilise_raw` for a raw image `without_prnu`.
 
-    Below the first step this is `unstabilise`. Above a step, where noise is tens of electrons or more, the mean is at
-    most k / 4 electrons off.
+    Below the first step this is `unstabilise`. Above a step, where noise is tens of electrons or more, the result is at
+    most k / 4 electrons off, with the step's k.
     """
     electrons = _electrons(stable, raw.plain_noise)
     for step, offset in _joined(raw):
@@ -153,7 +153,7 @@ def unstabilise(stable: NDArray[np.floating], dark_noise_e: float) -> NDArray[np
     stable : array
         Denoised values [standard deviations of noise].
     dark_noise_e : float
-        Dark noise that was given to `stabilise`, where PRNU was 0 [e-].
+        Dark noise that was given to `stabilise` [e-]; its PRNU has to be 0.
 
     Returns
     -------

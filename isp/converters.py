@@ -1,4 +1,4 @@
-"""Raw files for other programs: a negative, and beside it a 16-bit Bayer negative unless it is one itself."""
+"""Raw files for other programs: a DNG, and beside it a second DNG in 16-bit Bayer if the first isn't that."""
 
 from dataclasses import replace
 from math import ceil, log2
@@ -15,10 +15,10 @@ MOST_STEP = 3.0  # largest step of 16-bit numbers, in standard deviations of dar
 
 
 def for_converters(raw: RawImage) -> RawImage | None:
-    """Convert a raw image to Bayer in 16-bit whole numbers, which every raw converter develops; None if it is that.
+    """Convert a raw image to 16-bit Bayer, which every raw converter develops; return None if it needs no change.
 
-    Another mosaic is re-mosaiced (`isp.remosaic`). Floats become whole numbers if the steps of 16 bits are at most
-    `MOST_STEP` standard deviations of dark noise. Otherwise they stay floats, which some converters refuse.
+    Mosaics other than Bayer are re-mosaiced (`isp.remosaic`). Floats become whole numbers if the steps of 16 bits are
+    at most `MOST_STEP` standard deviations of dark noise. Otherwise they stay floats, which some converters refuse.
 
     Raises
     ------
@@ -40,15 +40,15 @@ def for_converters(raw: RawImage) -> RawImage | None:
 
 
 def sixteen_bit_step_e(raw: RawImage) -> float:
-    """Return the step of a raw image's samples in 16 bits [e-]: a power of two of its own digital numbers."""
+    """Return the step [e-] that a raw image's samples have in 16 bits: one digital number times a power of two."""
     return float(raw.gain_e_per_dn * 2.0 ** max(ceil(log2(raw.white_dn / 65_535)), 0))
 
 
 def write_with_bayer(raw: RawImage, path: str | Path, *, frame: int | None = None) -> tuple[Path, ...]:
     """Write a raw file and, if it is a .dng that not every converter develops, NAME_bayer.dng; return their paths.
 
-    A .dng of RGBW, a quad mosaic or merged readings is for rodcone and software that reads mosaics. Raw converters take
-    NAME_bayer.dng (`for_converters`). A .tif has its .json beside it.
+    A .dng of RGBW, a quad mosaic or merged readings is for rodcone and software that reads mosaics. NAME_bayer.dng is
+    for raw converters (`for_converters`). A .tif gets a .json beside it.
 
     Parameters
     ----------
@@ -78,10 +78,10 @@ def bayer_name(path: Path) -> Path:
 
 
 def converter_note(raw: RawImage, path: Path) -> str:
-    """Say which file to give to a converter instead of a negative of merged samples, and how it differs.
+    """Return a text that says which file to give to a converter instead of the DNG `path`, and how this file differs.
 
-    The text is empty if samples aren't merged. For another mosaic than Bayer's alone there is no note, because
-    `rodcone --help` explains it.
+    The text is empty unless samples are floats, as merged readings are, and the other file exists. If the mosaic is the
+    only difference, there is no text, because `rodcone --help` explains it.
     """
     ways = [] if is_bayer(raw.cfa) else ["re-mosaiced"]
     if raw.dn.dtype.kind == "f":

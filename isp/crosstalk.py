@@ -1,9 +1,9 @@
-"""Crosstalk undone: each pixel gets back the charge that it handed to its neighbours, before all other development.
+"""Removal of crosstalk: each pixel gets back the charge that went to its neighbours, before all other development.
 
-A pixel hands the share c of its charge x to each of its four neighbours, and the samples are y = H x
-(`sensor.readout.spread_charge`). H depends on no filter, because it acts on charges, whatever colour brought them. At
-the frame's edge the charge stays, as if a mirror image went on there. The waves of the cosine transform (DCT-II) go on
-in the same way. Therefore they are the eigenvectors of H, with the eigenvalues
+A pixel loses the share c of its charge x to each of its four neighbours, and the samples are y = H x
+(`sensor.readout.spread_charge`). H doesn't depend on the filters, because it acts on charges, whatever colour of light
+brought them. At the frame's edge the charge stays, as if the frame continued as its mirror image. The waves of the
+cosine transform (DCT-II) continue in the same way. Therefore they are the eigenvectors of H, with the eigenvalues
 
     h(k, l) = 1 - 2 c (2 - cos(pi k / height) - cos(pi l / width)),   k < height, l < width,
 
@@ -23,9 +23,9 @@ from rodcone.types import Floats, Mosaic
 from sensor.cfa import mask
 from sensor.raw import RawImage, full_at_sites
 
-# Up to here at least a fifth of every wave is left. From 0.125 on there are waves of which nothing is left.
+# Largest crosstalk that is undone, which leaves at least a fifth of every wave. From 0.125 on some waves vanish.
 MOST_UNDONE = 0.1
-LEAST_COUNTED = 0.05  # of nine pixels; less is rounding
+LEAST_COUNTED = 0.05  # least share of nine pixels that counts as one of them or more; less is rounding
 
 
 def is_undone(crosstalk: float) -> bool:
@@ -36,16 +36,17 @@ def is_undone(crosstalk: float) -> bool:
 def without_crosstalk(raw: RawImage, neutral: Floats) -> RawImage:
     """Return a raw image in which each pixel has the charge that it collected behind its own filter.
 
-    A saturated sample stays as it is, and so does one that would become saturated. What a saturated pixel handed on is
-    taken from `beyond_the_well`. Of the noise profile dark noise is that of the new samples, larger by some 4 c; shot
-    noise and PRNU stay as they are read, because most of what is added lies in the finest detail.
+    A saturated sample stays as it is, and so does one that would become saturated. The charge that saturated pixels
+    lost to their neighbours is estimated by `beyond_the_well`. In the noise profile, dark noise becomes that of the new
+    samples, which is larger by a share of about 4 c. Shot noise and PRNU stay those of the old samples, because most of
+    the added noise lies in the finest detail.
 
     Parameters
     ----------
     raw : RawImage
-        Without crosstalk, or with more than `MOST_UNDONE`, it is returned unchanged.
+        Raw image, which is returned unchanged if it has no crosstalk or more than `MOST_UNDONE`.
     neutral : (channel,) float64
-        What the channels read of a neutral, in any unit.
+        The channels' readings of a neutral, in any unit.
 
     Warns
     -----
@@ -66,7 +67,7 @@ def without_crosstalk(raw: RawImage, neutral: Floats) -> RawImage:
     charge_e = unspread_charge(beyond_the_well(raw, neutral) * density, raw.crosstalk) / density
     dn = charge_e / raw.gain_e_per_dn + raw.black_dn
     dn = np.where(raw.saturated | full_at_sites(raw, dn), raw.dn, dn)
-    larger = float(np.sqrt(np.mean(left_of_waves(raw.shape, raw.crosstalk) ** -2)))  # dark noise
+    larger = float(np.sqrt(np.mean(left_of_waves(raw.shape, raw.crosstalk) ** -2)))  # factor on dark noise
     apart = (
         replace(noise, read_noise_e=larger * noise.read_noise_e, dsnu_e=larger * noise.dsnu_e)
         for noise in raw.channel_noise
@@ -77,15 +78,16 @@ def without_crosstalk(raw: RawImage, neutral: Floats) -> RawImage:
 
 
 def beyond_the_well(raw: RawImage, neutral: Floats) -> Mosaic:
-    """Return a raw image's electrons, with those of a saturated sample that its neighbours tell of, if they are more.
+    """Return a raw image's electrons, where saturated samples are raised to an estimate from their neighbours.
 
-    The neighbours tell of a neutral: it has the mean of what the channels' unsaturated samples in 3x3 pixels read over
-    what they read of one. Without it the neighbours of full W would keep what W handed them beyond its well.
+    The light there is assumed to be neutral. Its level is the mean, over the channels, of their unsaturated samples in
+    3x3 pixels, each divided by its channel's reading of a neutral. A lower estimate doesn't count. Without this, the
+    neighbours of a full W would keep the charge that came from W beyond its well.
     """
     electrons, full = raw.electrons, raw.saturated
     if not full.any():
         return electrons
-    levels = np.zeros((len(neutral), *raw.shape))  # of a neutral, as each channel tells it; 0 if it doesn't
+    levels = np.zeros((len(neutral), *raw.shape))  # level of the neutral by each channel; 0 if it has no sample
     read = np.ones(raw.shape)
     for level, name, of_neutral in zip(levels, raw.channels, neutral, strict=True):
         sites = mask(raw.cfa, name, raw.shape)

@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 from sensor.cfa import channel_map
 from sensor.raw import RawImage
 
-_RINGS = 3  # distance [tiles] to which sound samples are searched before the whole frame's median is used
+_RINGS = 3  # distance [tiles] up to which sound samples are searched for; beyond, the whole frame's median is used
 
 
 def interpolate_defects(raw: RawImage) -> RawImage:
     """Replace each listed pixel by the median of the nearest sound samples of its channel, and drop the list.
 
-    The nearest samples are all those in a window that reaches one tile to either side, or more until it holds one. The
-    median is taken because a cluster may hold a defect that isn't listed. A channel without any sound sample gets the
-    black level.
+    The nearest samples are all those in a window that reaches one tile to either side, or two or three tiles if it
+    holds none; after that the median of the whole frame is used. It is the median because a cluster may include a
+    defect that isn't listed. A channel without any sound sample gets the black level.
     """
     if raw.defects is None:
         return raw

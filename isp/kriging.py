@@ -1,9 +1,10 @@
-"""Every channel at every pixel as the best linear estimate of any mosaic: universal kriging (Matheron 1969).
+"""Best linear estimate of every channel at every pixel of any mosaic: universal kriging (Matheron 1969).
 
-Channels are modelled as correlated random fields, each around a plane with three unknown numbers. Of all weights that
-reproduce a mosaic of planes, constant or linear, exactly, those of least expected error are taken. Samples are in units
-of their noise (`isp.anscombe`). Unlike the interleaved reconstruction, which chooses samples that look alike, this is
-one fixed filter for each pixel of the tile and frame, and a second one, channel by channel, near lamps.
+Channels are modelled as correlated random fields, each around a plane with three unknown numbers (level and slopes).
+Among all weights that reproduce constant and linear channels exactly, those of least expected error are used. Samples
+are in units of their noise (`isp.anscombe`). The interleaved reconstruction chooses samples that look alike; here a
+pixel's filter depends only on its place in the tile and near the border. Near lamps a second filter is used, which
+estimates each channel from its own samples.
 """
 
 from collections.abc import Iterator
@@ -29,7 +30,7 @@ SIDE = 2 * RADIUS + 1  # side of the window
 CORRELATION = 0.93  # correlation of two channels' values at one pixel
 LENGTH = 6.0  # length of the exponential covariance [pixels]
 BESIDE_LAMPS = 1e3  # assumed variation of a channel beside a lamp [standard deviations of noise]
-OUTLYING = 8.0  # a lamp's sample lies so many half widths of the middle two thirds above them
+OUTLYING = 8.0  # a sample is a lamp's if it lies above the middle two thirds by so many times half their width
 STRIP_ROWS = 256  # rows that are estimated together, so that memory never holds a whole frame of every channel
 LEAST_DEVIATION = 0.1  # least assumed variation of a channel, which a flat field lacks [standard deviations of noise]
 
@@ -132,12 +133,12 @@ def krige(
 
 
 def _reach(at: int, side: int) -> tuple[int, int]:
-    """Return the offsets of a window around a pixel that lie in the frame: the first, and one after the last."""
+    """Return the part of a window around a pixel that lies in the frame: its first offset, and one after the last."""
     return -min(RADIUS, at), min(RADIUS, side - 1 - at) + 1
 
 
 def _alike(side: int, period: int) -> list[slice]:
-    """Group the positions along one axis that share weights: inside by phase, near the border each by itself."""
+    """Group the positions along one axis by equal weights: inside by phase of the tile, near the border one by one."""
     inside = range(RADIUS, max(side - RADIUS, RADIUS))
     border = [at for at in range(side) if at not in inside]
     phases = [slice(first, inside.stop, period) for first in inside[:period]]
@@ -158,7 +159,7 @@ def _weighted(
     around = values[rows.start + top : rows.stop - 1 + bottom, columns.start + left : columns.stop - 1 + right]
     windows = sliding_window_view(around, (bottom - top, right - left))[:: rows.step, :: columns.step]
     total = np.empty((len(weights), *windows.shape[:2]))
-    for row, samples in enumerate(windows):  # one at a time, because BLAS's last bits depend on the matrix's size
+    for row, samples in enumerate(windows):  # one row at a time, because BLAS's last bits depend on the matrix's size
         total[:, row] = weights @ samples.reshape(-1, weights.shape[1]).T
     return total
 
@@ -174,7 +175,18 @@ def _nearness() -> Plane:
 def _weights(
     tile: Tile, phase: tuple[int, int], down: tuple[int, int], across: tuple[int, int], scales: tuple[float, ...]
 ) -> Plane:
-    """Compute each channel's weights of a window's samples, row by row, shape (channel, sample)."""
+    """Compute the weights of a window's samples, row by row, in the estimate of each channel, shape (channel, sample).
+
+    Parameters
+    ----------
+    tile : tuple of str
+    phase : (int, int)
+        Row and column of the pixel within the tile.
+    down, across : (int, int)
+        First offset of the window from the pixel along each axis, and one after the last.
+    scales : tuple of float
+        Standard deviation of each channel, and the correlation of two channels at one pixel.
+    """
     names, (*deviation, correlation) = channels(tile), scales
     rows, columns = (x.ravel() for x in np.mgrid[slice(*down), slice(*across)])
     cells = np.array([[names.index(name) for name in row] for row in tile])
@@ -195,5 +207,5 @@ def _weights(
     right_side = np.concatenate([target_covariance, target], axis=1).T
     if np.linalg.matrix_rank(planes) == len(planes):
         return np.asarray(np.linalg.solve(system, right_side)[: rows.size].T)
-    # In a small frame a channel may have too few samples for its slope; then least squares are taken.
+    # In a small frame a channel may have too few samples for its slope; then the least-squares solution is used.
     return np.asarray(np.linalg.lstsq(system, right_side, rcond=None)[0][: rows.size].T)

@@ -1,4 +1,4 @@
-"""A developed picture, and the last steps from linear planes of three colours to it."""
+"""A developed picture, and the last steps of development from linear planes of three colours."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from sensor.raw import RawImage
 
 @dataclass(frozen=True)
 class Picture:
-    """A developed picture and the decisions made for it; NumPy takes it as its linear RGB.
+    """A developed picture and the decisions made for it; in NumPy it is an array of its linear RGB.
 
     Attributes
     ----------

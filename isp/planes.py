@@ -49,7 +49,7 @@ def fill(values: NDArray[np.floating], tile: Tile, channel: str) -> NDArray[Any]
     -------
     (h, w) of the same type
         The plane. If the frame's edge cuts off every sample within the tent's radius, the next radius that reaches one
-        is taken. Sums have the same order at every pixel, so that a part of the frame gives the same bits.
+        is used. Sums have the same order at every pixel, so that a part of the frame gives the same bits.
     """
     result = np.empty_like(values)
     down, across = len(tile), len(tile[0])
@@ -71,7 +71,10 @@ def fill(values: NDArray[np.floating], tile: Tile, channel: str) -> NDArray[Any]
 def _tent_sums(
     values: NDArray[np.floating], tile: Tile, channel: str, phase: tuple[int, ...], radius: int
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Sum tent times sample, and the tent, over the samples in the frame, for the pixels at one phase of the tile."""
+    """Compute the sums of tent times sample, and of the tent alone, for the pixels at one phase of the tile.
+
+    Both sums are over the samples that lie in the frame.
+    """
     size = (len(tile), len(tile[0]))
     tents = _phase_tent(tile, channel, phase, radius).astype(values.dtype)
     counts = [len(range(first, length, pace)) for first, length, pace in zip(phase, values.shape, size, strict=True)]
@@ -91,7 +94,7 @@ def _tent_sums(
 
 @lru_cache(maxsize=256)
 def _phase_tent(tile: Tile, channel: str, phase: tuple[int, ...], radius: int) -> Plane:
-    """Return the tent around a pixel of one phase of the tile, 0 where there is no sample of the channel."""
+    """Return the tent around a pixel at one phase of the tile; it is 0 where there is no sample of the channel."""
     size = 2 * radius + 1
     rows, columns = (
         (np.arange(size) - radius + first) % n for first, n in zip(phase, (len(tile), len(tile[0])), strict=True)
@@ -106,7 +109,7 @@ def rows_at(values: NDArray[Any], pixels: NDArray[np.bool_]) -> NDArray[Any]:
 
 
 def box_sums(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
-    """Sum each box of `size` that lies in the array, everywhere in the same order: pairs, fours, eights."""
+    """Sum the values of each box of `size` in the array, everywhere in the same order: pairs, fours, eights."""
     height, width = (length - count + 1 for length, count in zip(values.shape, size, strict=True))
     result = np.empty((height, width), values.dtype)
     for first in range(0, height, BLOCK_ROWS):
@@ -116,7 +119,7 @@ def box_sums(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
 
 
 def _line_sums(values: NDArray[Any], count: int) -> NDArray[Any]:
-    """Sum each `count` consecutive rows, from sums over powers of two."""
+    """Sum every `count` consecutive rows, by means of sums over powers of two."""
     rows = len(values) - count + 1
     start = 0
     power = 1

@@ -16,8 +16,8 @@ from sensor.raw import RawImage
 def bayer_tile(tile: Tile) -> Tile:
     """Return the Bayer tile to which a mosaic is converted.
 
-    For quad Bayer it is the plain Bayer tile. For RGBW, 2x2 or quad, R stands where the plain tile has it, B diagonal
-    to R, and G at the two other sites.
+    For quad Bayer it is the tile with one pixel in place of 2x2 (`sensor.cfa.plain`). A quad RGBW tile is first reduced
+    in the same way. In a 2x2 tile of RGBW, R keeps its site, B is diagonal to R, and G is at the two other sites.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def bayer_tile(tile: Tile) -> Tile:
 def remosaic(raw: RawImage, tile: Tile | None = None) -> RawImage:
     """Convert a raw image to another mosaic of the same size and levels.
 
-    Where the two mosaics agree, the sample is kept; elsewhere the channel's best linear estimate is taken
+    Where the two mosaics agree, the sample is kept; elsewhere it is replaced by the channel's best linear estimate
     (`isp.kriging`). The noise of these pixels isn't that of the noise profile, and is correlated with their
     neighbours'. Defective pixels are replaced first.
 

@@ -99,9 +99,9 @@ class Reconstruction:
     noise_gain : (h, w, channel) ndarray
         sum w^2 / (sum w)^2, 0 to 1: the factor by which the weights reduce the variance of white noise on the samples.
     engine : {"cuda", "llvm", "numpy"}
-        Engine that computed it.
+        Engine that computed the frame.
     white : WhiteReading or None
-        The guide; None if each channel has its own.
+        The frame read as W, with the guide; None if each channel has a guide of its own.
     """
 
     estimate: NDArray[np.floating]
@@ -112,12 +112,12 @@ class Reconstruction:
 
 @dataclass(frozen=True)
 class WhiteReading:
-    """A frame whose every sample is read as W (`isp.interleaved.panchromatic.read_as_white`).
+    """A frame whose every sample was converted to W (`isp.interleaved.panchromatic.read_as_white`).
 
     Attributes
     ----------
     raw : RawImage
-        The frame, in which full samples of W are raised to what the colours around say of a neutral.
+        The frame, in which full samples of W are raised to what W would read if the colours around were a neutral's.
     shares : (rows, columns, channel) float
         Each channel's electrons per electron of W in the surroundings of every tile, in the order of
         `sensor.cfa.channels`.

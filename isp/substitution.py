@@ -1,7 +1,7 @@
 """Luminance substitution: in deep darkness W gives the picture its luminance (Parmar & Wandell 2009, 3.1.3).
 
 The paper switches W's luminance on or off. Here its weight falls smoothly with the frame's SNR, so that a sweep over
-light shows no step; a weight over a half counts as on. W is not exactly luminance. The matrix that was fitted on
+light shows no step; a weight over a half counts as on. W isn't exactly luminance. The matrix that was fitted to
 surfaces (`isp.colour.colour_fit`) corrects this as far as the noise of the colours allows.
 """
 
@@ -21,9 +21,9 @@ SUBSTITUTION_SNR_TABLE1_PIXEL = 0.672  # preset `table1_pixel`, with SNRs of 0.4
 OCTAVES = 1.0  # half width of the transition; if narrower, it shows as a step; if wider, W remains in bright pictures
 
 # Ratios of the reconstructed colours' squared error to their noise variance. The error is larger, because each colour
-# is sampled at one pixel in four, and pixels that are alike in W may differ in colour. The first ratio counts in the
-# substituted luminance and in the matrix, the second where the colour is that of the surroundings
-# (docs/decisions/0015).
+# is sampled at one pixel in four, and pixels that are alike in W may differ in colour. The first ratio is used for the
+# substituted luminance, and for the matrix of other cameras; the second for the colours of the interleaved camera,
+# where noise makes them those of the surroundings (docs/decisions/0015).
 COLOUR_ERROR = 10.0
 SMOOTH_COLOUR_ERROR = 3.0
 

@@ -1,4 +1,4 @@
-"""Colours of a raw file whose response curves are unknown: a `ColourFit` from its calibration's matrices."""
+"""Colours of a raw file whose response curves are unknown: a `ColourFit` from the matrices of its calibration."""
 
 import numpy as np
 
@@ -15,8 +15,8 @@ WIDTH = band_widths(NM)
 # Mean and mean product of the ColorChecker's 24 patches in linear sRGB under D65 (`scenes.reflectances`).
 MEAN_SRGB = np.array([0.3295, 0.2602, 0.2292])
 MOMENTS_SRGB = np.array([[0.1875, 0.1203, 0.0822], [0.1203, 0.1140, 0.0838], [0.0822, 0.0838, 0.0969]])
-# RMS part of W that three colours don't explain, as a share of white: for the project's curve on the ColorChecker it is
-# 0.043 under D65, 0.046 under F11 and 0.066 under A. Without it the fit would trust W too much where W has no noise.
+# RMS of the part of W that three colours don't explain, over W of white. For the project's curves on the ColorChecker
+# it is 0.043 under D65, 0.046 under F11 and 0.066 under A. Without it the fit would rely too much on W without noise.
 UNEXPLAINED = 0.05
 
 
@@ -24,18 +24,18 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...], mixing
     """Fit the colours of a camera that is known only by matrices.
 
     R, G and B respond to linear sRGB by the inverse of `colour.to_srgb`. Any other channel responds by its row of the
-    matrix from XYZ, under that of A and D65 whose neutral is nearer to the exposure's. What a channel sees beyond three
-    colours isn't known, and `UNEXPLAINED` stands for it. With one or two channels all respond by their rows, and the
-    colours are grey.
+    matrix from XYZ under A or D65, whichever light's neutral is nearer to the exposure's. The part of its response that
+    three colours don't explain isn't known; `UNEXPLAINED` is used instead. With one or two channels all respond by
+    their rows, and the colours are grey.
 
     Parameters
     ----------
     names : tuple of str
-        The channels in the order of `sensor.cfa.channels`: R, G and B first, or others in their place.
+        The channels in the order of `sensor.cfa.channels`: R, G and B first, or other colours in their place.
     mixing : (channel, channel) float64, optional
-        For pixels that exchange charge, `RawImage.channel_mixing`. The calibration is that of the channels as they
-        read, and the fit that of the light behind each filter. If there are more than three channels, all of them then
-        respond by their rows.
+        `RawImage.channel_mixing`, for pixels that exchange charge. The calibration describes the channels as they are
+        read, and the fit the light behind each filter. If there are more than three channels, all of them then respond
+        by their rows.
     """
     three = len(names) >= 3
     by_rows = mixing is not None and len(names) > 3

@@ -1,9 +1,9 @@
 """Conversion of camera channels to colour: the least-squares matrix, and a fit that takes a frame's noise into account.
 
-A matrix fitted without noise takes differences of channels to show saturated colours, and so amplifies noise.
-`ColourFit` minimises the expected squared error of surface and noise together (Wiener 1949): where the colours carry
-little noise it is the least-squares matrix over all channels; the noisier they are, the more it takes from the channel
-with the least noise, W, and the paler the colours get.
+A matrix that is fitted without noise makes saturated colours from differences of channels, and thus amplifies noise.
+`ColourFit` minimises the expected squared error of surface and noise together (Wiener 1949). If the colours have little
+noise, it gives the least-squares matrix over all channels. The noisier they are, the larger is the weight of W, the
+channel with the least noise, and the paler the colours become.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from sensor.raw import RawImage, channel_variance
 LEAST_NOISE = 1e-13
 MEDIAN_STEP = 7  # medians take every seventh pixel; the step is odd, so that all cells of the tile take part
 WHITE_REST = 3.0  # variance of what W sees beyond the colours, over its variance for the training surfaces
-LEAST_SIGNAL = 1e-3  # least signal over noise, which keeps the equations solvable in a frame of pure noise
+LEAST_SIGNAL = 1e-3  # least ratio of signal to noise, which keeps the equations solvable in a frame of pure noise
 
 
 @dataclass(frozen=True)
 class ColourFit:
-    """Relation of balanced channels to colour, as moments over training surfaces under one light.
+    """Relation of white-balanced channels to colour, as moments over training surfaces under one light.
 
     Attributes
     ----------
     channels : tuple of str
-        Channels; the three colours come first, if there are so many.
+        Channels; the three colours come first, if there are three.
     mean : (channel,) float64
         Mean balanced signal; a surface that reflects all light has a signal of 1.
     moments : (channel, channel) float64
@@ -45,8 +45,8 @@ class ColourFit:
     cross : (channel, 3) float64
         Mean product of a signal and linear sRGB under the light, adapted to D65.
     plain : (3, 3) float64 or None
-        A matrix of the three colours that replaces the moments. It takes no noise into account, and uses W directly as
-        luminance.
+        A given matrix from the three colours to linear sRGB, which is used instead of the moments. It doesn't depend on
+        noise, and W is then luminance by itself.
     """
 
     channels: tuple[str, ...]
@@ -102,7 +102,7 @@ class ColourFit:
             return np.hstack([self.plain, np.zeros((3, len(used) - 3))])
         index = [self.channels.index(name) for name in used]
         moments = self.moments[np.ix_(index, index)] + np.diag(np.broadcast_to(noise, len(index)) + LEAST_NOISE)
-        # Rows sum to 1 since the last coefficient is 1 minus the others: differences from the last channel are fitted.
+        # Rows sum to 1, because differences from the last channel are fitted, whose coefficient is 1 minus the others.
         difference = np.hstack([np.eye(len(index) - 1), -np.ones((len(index) - 1, 1))])
         target = difference @ (self.cross[index] - moments[:, -1:])
         free = np.linalg.solve(difference @ moments @ difference.T, target)
@@ -118,13 +118,13 @@ def fit_colours(
     width_nm: ArrayLike | None = None,
     lamp: Spectrum | None = None,
 ) -> ColourFit:
-    """Fit a camera's colours under a light; parameters are those of `training`, responses those of channels `names`.
+    """Fit a camera's colours under a light; `responses` are those of channels `names`, and the rest as in `training`.
 
     Beside three colours, W is modelled as a_R R + a_G G + a_B B plus an independent rest, where a sums to 1 and is
     fitted by least squares. W then adds nothing to the colours except where it has less noise than they have. (When W
     was fitted freely to a chart's two dozen surfaces, the result was 4.7 dB worse than with the three colours on
-    `night_street` without noise.) One or two channels can't tell colours; they are fitted to luminance, and the picture
-    is grey.
+    `night_street` without noise.) One or two channels can't distinguish colours; they are fitted to luminance, and the
+    picture is grey.
 
     Raises
     ------
@@ -255,9 +255,9 @@ def relative_noise(
 ) -> Floats:
     """Estimate the noise variance of a frame's balanced channels, for `ColourFit.matrix`.
 
-    Each channel has one number per frame, because a matrix per pixel would flicker. It is the noise at the frame's
-    mean, relative to the signal of a surface that reflects all light. That signal is estimated from the frame's mean
-    green (`sensor.cfa.unit_channel`), which is taken for the mean of the training surfaces.
+    Each channel has one number per frame, because a matrix per pixel would flicker. It is the variance at the frame's
+    mean, relative to the squared signal of a surface that reflects all light. That signal is estimated from the frame's
+    mean green (or `sensor.cfa.unit_channel`), on the assumption that the scene is as bright as the training surfaces.
 
     Parameters
     ----------
@@ -270,6 +270,7 @@ def relative_noise(
     Returns
     -------
     (channel,) float64
+        Variances [(signal of a surface that reflects all light)^2].
     """
     unit = raw.unit_channel
     green = raw.channels.index(unit)
@@ -283,5 +284,5 @@ def relative_noise(
         medians = np.median(noise_gains, axis=1, overwrite_input=True)
     variance = channel_variance(raw, mean) * medians * gains**2
     white = mean[green] * gains[green] / fit.mean[fit.channels.index(unit)]
-    # A frame without any signal is all noise; there W alone decides, whatever the ratio is.
+    # A frame without any signal is only noise. The matrix then depends on W alone, whatever the divisor is.
     return np.asarray(variance / max(white**2, LEAST_SIGNAL**2 * float(variance.max())))

@@ -17,7 +17,7 @@ STRIP_ROWS = 128  # rows that are encoded together
 
 @dataclass(frozen=True)
 class Encoding:
-    """A display's colour space; both share D65 as white and the curve of IEC 61966-2-1.
+    """A display's colour space; all in `ENCODINGS` have D65 as white and the curve of IEC 61966-2-1.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
 def encode(
     linear_srgb: NDArray[np.floating], encoding: str, *, white: float = 1.0, gain: float = 1.0
 ) -> NDArray[np.float64]:
-    """Encode ``linear_srgb / white * gain`` (..., 3) for a display, clipped to [0, 1] in its own primaries.
+    """Encode ``linear_srgb / white * gain`` (..., 3) for a display, clipped to [0, 1] in the display's primaries.
 
     Raises
     ------

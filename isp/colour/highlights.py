@@ -1,11 +1,11 @@
-"""Highlights that stay neutral: colours are limited where one of them is full, and small full lamps become white.
+"""Neutral highlights: colours are limited where one of them is full, and small full lamps become white.
 
-A full sample is a lower bound of the light. Within a wide highlight, samples of every colour tell its hue. A lamp of a
-few pixels may cover samples of only some colours. The planes of the others are then filled from the dark around it, and
-the lamp would get the colour of the samples that it happens to cover. Therefore a full pixel becomes white, unless a
-sample of its lamp shows a colour. A sample belongs to the lamp if it is lit, or if it lies in a rectangle, at most a
-tile wide and high, with lit samples at two opposite corners. This is how the dark blue sites of a sodium lamp of 2x2
-pixels belong to it.
+A full sample is a lower bound of the light. Within a wide highlight, samples of every colour show its hue. A lamp of a
+few pixels, however, may cover samples of only some colours. The planes of the other colours are then filled from the
+dark around the lamp, so that it would get the colour of the samples that it happens to cover. Therefore a full pixel
+becomes white, unless a sample of its lamp shows a colour. A sample belongs to the lamp if it is lit, or if it lies in a
+rectangle, at most a tile wide and high, with lit samples at two opposite corners. In this way the dark blue sites of a
+sodium lamp of 2x2 pixels belong to the lamp.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from sensor.raw import RawImage
 
 # Limits as shares of `highlight_level`.
 LIT = 0.25  # a brighter sample belongs to a lamp; samples beside a sharp lamp and in its halo are darker
-FULL = 0.97  # a brighter sample may be at the level itself, because shot noise and unequal gains shift it that much
+FULL = 0.97  # a brighter sample counts as full, because shot noise and unequal gains may shift it by the rest
 
 
 def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> NDArray[np.bool_]:
@@ -32,7 +32,7 @@ def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> 
 
 
 def highlight_level(raw: RawImage, gains: NDArray[np.float64]) -> float:
-    """Return the balanced electrons at which the first colour is full: green's well, or a smaller balanced well."""
+    """Return the balanced electrons at which the first colour is full: the smallest of the colours' balanced wells."""
     wells_e = {name: raw.noise_of(name).full_well_e for name in raw.colour_channels}
     return float(min(gains[raw.channels.index(name)] * well_e for name, well_e in wells_e.items()))
 
@@ -63,7 +63,7 @@ def clip_highlights(
 
 @dataclass(frozen=True)
 class Highlights:
-    """Places and level of a frame's highlights, so that they can be limited strip by strip.
+    """Places and level of a frame's highlights, by which strips of the frame can be limited one by one.
 
     Attributes
     ----------
@@ -104,9 +104,10 @@ class Highlights:
 
 
 def white_lamps(raw: RawImage, gains: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Mark full pixels near a full colour sample whose lamp has no sample that shows a colour, shape (h, w).
+    """Mark the full pixels of white lamps, shape (h, w).
 
-    A lamp's colour sample within one tile shows a colour if it is below the level of highlights.
+    These are full pixels within one tile of a full colour sample, if no colour sample of the lamp within one tile is
+    below `FULL` times the level of highlights, which would show that the lamp has a colour.
     """
     colours = "".join(raw.colour_channels)
     full = raw.saturated

@@ -1,9 +1,10 @@
-"""Noise-aware colours for processors that don't state the noise of their planes, by gains that were measured before.
+"""Noise-aware colours for processors that don't state the noise of their planes, by measured noise gains.
 
 A processor's planes differ from the true ones by remaining noise and by blur. This error, in units of one sample's
-noise variance, is measured on training pictures at several levels (``python benchmarks/measure_noise_gains.py``) and
-kept in ``noise_gains.toml`` with the command and versions. The file also holds a factor on the error, which makes the
-training pictures best on condition that no kind of them gets worse than by the plain matrix, which is a factor of 0.
+noise variance, is measured on training pictures at several levels of light
+(``python benchmarks/measure_noise_gains.py``) and kept in ``noise_gains.toml`` with the command and versions. The file
+also holds a factor on each processor's error. It is the factor that gives the best training pictures, on condition that
+no kind of picture gets worse than by the plain matrix (a factor of 0).
 """
 
 from collections.abc import Mapping
@@ -25,14 +26,15 @@ TABLE = Path(__file__).with_name("noise_gains.toml")
 
 @dataclass(frozen=True)
 class NoiseGains:
-    """Variance of a processor's planes that its colour matrix assumes, over one sample's noise variance.
+    """Error variance of a processor's planes for its colour matrix, over one sample's noise variance.
 
     Attributes
     ----------
     snr_db : (level,) float64
         SNR of the frame's mean by `mean_snr`, increasing [dB].
     gains : (level, 3) float64
-        Gains of the three channels that the matrix takes; beyond the ends the last ones hold.
+        Gains of the three channels from which the matrix computes colours. Beyond either end of `snr_db`, those at
+        the end hold.
     """
 
     snr_db: Floats

@@ -35,7 +35,7 @@ class WhiteBalance:
     ----------
     neutral : (channel,) float64 or None
         Calibrated response to a neutral, in the order of `sensor.cfa.channels`, for pictures that are too dark for Gray
-        World. None stands for the project's own curves under D65.
+        World. None means that of the project's own curves under D65.
     given : (channel,) float64 or None
         Response to what should become neutral, in place of Gray World's means.
     """
@@ -65,7 +65,7 @@ class WhiteBalance:
         return raw.channel_mixing @ neutral_response(raw.channels) if self.neutral is None else self.neutral
 
     def expected(self, raw: RawImage) -> Floats:
-        """Return the response to a neutral before the picture is known: given or else calibrated, (channel,)."""
+        """Return the response to a neutral before the picture is known: given or else calibrated, shape (channel,)."""
         return self.response(raw) if self.given is None else self.given
 
     def without_crosstalk(self, raw: RawImage) -> WhiteBalance:
@@ -78,7 +78,7 @@ class WhiteBalance:
         return replace(self, neutral=neutral, given=given)
 
     def gains(self, raw: RawImage, planes: NDArray[np.floating]) -> tuple[Floats, Mapping[str, BalanceSource]]:
-        """Compute the gains of a frame, and state where they come from.
+        """Compute the white-balance gains of a frame, and state where they come from.
 
         Parameters
         ----------

@@ -11,8 +11,8 @@ component's mean. No estimator knows the component, so that this is a lower boun
 covariance of all patches together is linear in the samples and can be built. Its error, by the same formula for one
 Gaussian, is an upper bound. Both are expectations over the prior; an easy scene has less error.
 
-With a lens L, what is estimated is L x, because the blur isn't undone, but it is compared with x. With V_k = C_k - P_k,
-the part of the covariance that the samples explain, the error is
+With a lens L, the estimate is one of L x, because the blur isn't undone, but it is compared with x. With
+V_k = C_k - P_k, the part of the covariance that the samples explain, the error is
 
     C_k + L V_k L' - V_k L' - L V_k + (L mu_k - mu_k)(L mu_k - mu_k)'
 """
@@ -28,7 +28,7 @@ from rodcone.types import Floats
 from sensor.noise_law import NoiseLaw
 
 LEAST_SHARE = 1e-8  # least share of information that a clipped sample keeps
-FAR = 8.0  # a mean so many standard deviations below the well is never full
+FAR = 8.0  # a sample whose mean lies so many standard deviations below the well is never full
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,12 +91,12 @@ def single_gaussian(prior: Gaussians) -> Gaussians:
 
 
 def opening(distance: Floats) -> tuple[Floats, Floats]:
-    """Return the share of information that is left in a sample that may be clipped, and that share's slope.
+    """Return the share of information that is left in a sample that may be clipped, and its slope over `distance`.
 
-    The share o is the Fisher information about the mean in a Gaussian that is censored at the well, over that in one
-    that isn't. With a = (well - mean) / sigma ("distance"), o = Phi(a) + phi(a) (hazard(a) - a): the first term comes
-    from samples below the well, the second from full ones, which say only that the light was at least so much. The
-    slope do/da is phi(a) (hazard(a) - a)^2.
+    The share o is the Fisher information about the mean in a Gaussian that is censored at the well, over that in an
+    uncensored one. With a = (well - mean) / sigma ("distance"), o = Phi(a) + phi(a) (hazard(a) - a). The first term
+    comes from samples below the well, the second from full ones, which say only that the light was at least so much.
+    The slope do/da is phi(a) (hazard(a) - a)^2.
     """
     a = np.minimum(distance, FAR)
     density = np.exp(-(a**2) / 2) / np.sqrt(2 * np.pi)
@@ -125,7 +125,7 @@ def sample_variance(mean_e: Floats, spread_e2: Floats, noise: Noise) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Moments of a mosaic's samples of a prior's patches in unit light, for the estimate of the middle pixels.
+    """Moments of the samples that a mosaic takes of a prior's patches in unit light, to estimate the middle pixels.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ class Samples:
     cross : (component, sample, pixel, coefficient) float64
         H C_k L' at the middle pixels.
     error_cross : (component, sample, pixel, coefficient) float64
-        H C_k (2 I - L)' at these pixels; with the estimate's gain it gives C_k minus the error's covariance.
+        H C_k (2 I - L)' at these pixels. `within` minus its product with the estimate's gain is the error's matrix.
     within : (component, pixel, coefficient, coefficient) float64
         Sum of C_k and (L mu_k - mu_k)(L mu_k - mu_k)' for each middle pixel's coefficients.
     """
@@ -155,7 +155,7 @@ class Samples:
 
 
 def sampled(prior: Gaussians, sampling: Floats, middle: NDArray[np.intp], lens: Floats) -> Samples:
-    """Sample a prior's patches.
+    """Compute the moments of a mosaic's samples of a prior's patches.
 
     Parameters
     ----------

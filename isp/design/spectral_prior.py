@@ -15,14 +15,14 @@ PRIORS = {"drawn": Path(__file__).with_name("drawn.npz"), "photographs": Path(__
 
 @dataclass(frozen=True, eq=False)
 class SpectralPrior:
-    """A mixture of Gaussians over patches of 8x8 pixels; a pixel is a few coefficients of a basis of reflectances.
+    """A mixture of Gaussians over patches of 8x8 pixels, each given by some coefficients of a basis of reflectances.
 
     Attributes
     ----------
     edges_nm : (band + 1,) float64
         Edges of the basis's bands.
     spectra : (band, coefficient) float64
-        Reflectance of a coefficient of 1 in each band.
+        Reflectance in each band that a coefficient of 1 adds.
     patches : Gaussians
         Mixture over patches whose mean luminous reflectance is 1.
     reflectances : (quantile,) float64
