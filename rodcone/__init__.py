@@ -13,10 +13,11 @@ from rodcone.doors import require_no_shadow as _require_no_shadow
 
 _require_no_shadow()
 
-# Public name: module and attribute. Its strings are the one exemption from the layers (rodcone is the ground that
-# the other packages stand on): import-linter sees no imports here, since nothing is imported until a user asks.
-# docs/make/public_stub.py writes `__init__.pyi`, the same names with their types, from them and from the functions. No
-# module of this package may bear one of them. The file is read when a name is asked for: commands ask for none.
+# public.toml states the module and attribute of each public name. These texts are the only exception to the rule that
+# imports run downwards (rodcone is the lowest package): import-linter sees no imports, because nothing is imported
+# until a user asks. docs/make/public_stub.py writes `__init__.pyi`, the same names with their types, from this file and
+# from the functions. No module of this package may have one of these names. The file is read when a user first asks for
+# a name, which commands never do.
 
 
 def __getattr__(name: str) -> Any:
@@ -41,5 +42,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return the names that tab shows."""
+    """Return the names that an interpreter offers for completion."""
     return [*__getattr__("__all__"), "__version__"]

@@ -3,4 +3,4 @@
 from importlib import import_module
 
 if __name__ == "__main__":
-    import_module("studies.commands.cli").main()  # by name: rodcone is the ground that the command stands on
+    import_module("studies.commands.cli").main()  # by name, because imports run downwards only

@@ -1,8 +1,7 @@
-"""Child processes: their environment, and their end with their parent's.
+"""Child processes: their environment, and how they end together with their parent.
 
-They import what this process does, and nothing of the working directory.
-
-Python puts the working directory first on a child's path, where the folder of a downloaded scene may hold a numpy.py.
+Children import what this process can import, but nothing from the working directory. Python would put that directory
+first on a child's path, and the folder of a downloaded scene may contain a numpy.py.
 """
 
 import ctypes
@@ -11,7 +10,7 @@ import signal
 import sys
 
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
-SAFE_PATH = {"PYTHONSAFEPATH": "1"}  # as python -P, for its own children too
+SAFE_PATH = {"PYTHONSAFEPATH": "1"}  # like `python -P`, but also for the child's own children
 
 
 def safe_environment(**more: str) -> dict[str, str]:

@@ -14,8 +14,8 @@ D65_XY = np.array([0.3127, 0.3290])
 A_XY = np.array([0.44758, 0.40745])
 D50_XYZ = np.array([0.9642, 1.0, 0.8249])
 
-# Bradford cone responses (Lam 1985), as ICC.1:2010 Annex E gives them.
 WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # this percentile of a picture's luminance is shown at 90 % of white
+# Bradford cone responses (Lam 1985), as ICC.1:2010 Annex E gives them.
 _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 
 

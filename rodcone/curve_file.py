@@ -1,7 +1,7 @@
 """Tables of curves over wavelength, in the spellings of spreadsheets, renderers, light meters and IES TM-27.
 
-A table has wavelengths in its first column and one value or more in each further one. What stands before it (titles, a
-meter's list of results) and behind it is left out; a line in between, and a row that isn't whole, is refused.
+A table has wavelengths in its first column and one value or more in further columns. Text before it (titles, a meter's
+list of results) and after it is ignored. A line of text within the table is refused, and so is a row that isn't whole.
 """
 
 import csv
@@ -19,9 +19,9 @@ from rodcone.errors import InputError, read_errors
 from rodcone.files import read_bounded
 from rodcone.types import Floats
 
-ENDINGS = (".csv", ".tsv", ".txt", ".spd", ".spdx", ".xls")  # .xls: text that light meters name so
+ENDINGS = (".csv", ".tsv", ".txt", ".spd", ".spdx", ".xls")  # .xls: text files of light meters
 NM = "wavelength_nm"
-LEAST_NM = 50.0  # below it the column is in micrometres
+LEAST_NM = 50.0  # if no wavelength reaches this, the column isn't in nm but probably in micrometres
 MOST_BYTES = 1 << 23  # 100 columns at 0.1 nm over 300-1100 nm take 6 MB
 
 # Units of length in nm, as instruments write them. Others, such as cm-1, eV or THz, are refused by name.
@@ -57,7 +57,11 @@ def is_curve_file(name: str | Path) -> bool:
 
 @dataclass(frozen=True)
 class _Line:
-    """Line of a file: its number from 1, its text, its cells, and the numbers in them where all are numbers."""
+    """Line of a file: its number from 1, its text, its cells, and their numbers if every cell is one.
+
+    The cells are empty if the first isn't a number. `of_meter` says whether the first is spelt as by light meters
+    (`_METER`).
+    """
 
     number: int
     text: str
@@ -180,8 +184,8 @@ def _number(cell: str, separator: str | None) -> float | None:
 def _table(lines: Sequence[_Line], place: str) -> list[_Line]:
     """Return the rows of the only table among lines; refuse lines that are broken rows, and further tables.
 
-    A light meter lists one spectrum in coarse and in fine steps. Of such tables with the same first and last wavelength
-    the finest is taken.
+    A light meter lists one spectrum in coarse and in fine steps. If such tables have the same first and last
+    wavelength, the finest is used.
     """
     blocks: list[list[_Line]] = []
     for before, line in zip([None, *lines[:-1]], lines, strict=True):

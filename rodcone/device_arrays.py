@@ -13,7 +13,7 @@ ALIGNMENT = 64  # bytes; for memory that isn't aligned Dr.Jit compiles another, 
 
 
 def aligned(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Return an empty array whose memory starts at a multiple of `ALIGNMENT`: Dr.Jit takes it without a copy."""
+    """Return an empty array whose memory starts at a multiple of `ALIGNMENT`; Dr.Jit uses it without a copy."""
     size = int(np.prod(shape)) * np.dtype(dtype).itemsize
     memory = np.empty(size + ALIGNMENT, dtype=np.uint8)
     start = -memory.ctypes.data % ALIGNMENT
@@ -38,7 +38,7 @@ def upload(values: NDArray[Any], *, copy_under: float = inf) -> Any:
 
 @dataclass(frozen=True)
 class Divisor:
-    """A whole number to divide by (UInt), and its inverse (Float64): CPUs multiply in vectors."""
+    """A whole number to divide by (UInt), and its inverse (Float64), because CPUs multiply in vectors."""
 
     number: UInt
     inverse: Double

@@ -1,4 +1,4 @@
-"""What names the inputs of a result: hashes of plain data, by its values, and of files; in memory bits of arrays."""
+"""Keys for the inputs of a result: hashes of plain data and of files, and, for caches in memory, bits of arrays."""
 
 import hashlib
 import json
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 T = TypeVar("T")
-_BITS = 30  # of a float: what processors differ by is a millionth of the last, single precision has 24
+_BITS = 30  # bits of a float that are hashed; processors differ by a millionth of the last (single precision has 24)
 _LENGTH = 32  # hexadecimal digits, 128 bits: two of a million cells collide with a chance of 1e-27
 
 
@@ -74,7 +74,7 @@ def rounded(value: object) -> Any:
 
 @dataclass(frozen=True)
 class ByBits(Generic[T]):
-    """A value that equals another one where the arrays that it is made of have the same types and bits.
+    """A value that equals another one if the arrays of which both are made have the same types and bits.
 
     Attributes
     ----------

@@ -1,5 +1,5 @@
-"""How values show themselves: a line of text in place of all their numbers, curves and lines through pictures drawn by
-Matplotlib, and in a notebook a small picture, made only when it is shown.
+"""Display of values: one line of text instead of all numbers, curves and rows of pictures drawn by Matplotlib, and in a
+notebook a small picture, which is made only when it is shown.
 """
 
 from collections.abc import Callable, Mapping
@@ -13,15 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from rodcone.colour_spaces import encode_srgb, white_of
 from rodcone.errors import require_whole
 
-MOST_ITEMS = 6  # of an array, list or mapping that are written out
-MOST_NESTED = 160  # characters of a value inside another
-MOST_RANGED = 1 << 20  # elements of an array whose range is worth the time
+MOST_ITEMS = 6  # largest number of items of an array, list or mapping that are written out
+MOST_NESTED = 160  # largest number of characters of a value inside another one
+MOST_RANGED = 1 << 20  # largest number of elements of an array whose range is computed
 
 
 def brief(value: Any) -> str:
     """Return the text of a dataclass on one line: fields that differ from their defaults, arrays by shape and range.
 
-    A class that holds arrays or tables takes it as its ``__repr__``.
+    A class that holds arrays or tables uses this function as its ``__repr__``.
     """
     parts = [
         f"{field.name}={_text(getattr(value, field.name))}"
@@ -73,7 +73,7 @@ def _listed(items: list[str]) -> str:
     return f"{', '.join(items[: MOST_ITEMS - 1])}, ... {len(items)} in all"
 
 
-if TYPE_CHECKING:  # Matplotlib takes half a second to import: only who plots waits for it
+if TYPE_CHECKING:  # Matplotlib's import takes half a second, for which only a user who plots waits
     from matplotlib.axes import Axes as Axes  # noqa: PLC0414  (values import it from here)
 else:
     Axes = Any
@@ -138,8 +138,8 @@ def draw_line(planes: Mapping[str, NDArray[np.floating]], row: int | None, axes:
     return draw_curves(curves, axes, x=f"column, in row {row}", y=y, marker="." if width <= 128 else "")
 
 
-LEAST_SHOWN = 384  # pixels that a small picture is as wide as, about: each of its own is several there
-SIDE = 512  # most pixels of a shown picture's longer side
+LEAST_SHOWN = 384  # approximate width to which a smaller picture is enlarged [pixels]
+SIDE = 512  # largest longer side of a shown picture [pixels]
 
 
 def preview_png(linear: NDArray[np.floating]) -> bytes:

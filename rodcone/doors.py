@@ -1,9 +1,9 @@
-"""The checks that run before a public function: of each argument's kind, and of names, which become what they name.
+"""Checks that run before a public function: of each argument's kind, and of names, which become the objects they name.
 
-`rodcone.capture` is a function of the packages with these checks before it; the packages themselves trust what they are
-given. A parameter's own annotation says what it may be: a class, or a number within limits. The table `CHECKS` holds
-the rules that no annotation can state. Both this table and that of public names refer to higher packages by strings,
-which are imported when they are needed, because imports run downwards only.
+`rodcone.capture`, for example, is a function of a package with these checks before it; the packages themselves don't
+check again. A parameter's own annotation says what it may be: a class, or a number within limits. The table `CHECKS`
+holds the rules that no annotation can state. Both this table and that of public names refer to higher packages by
+strings, which are imported when they are needed, because imports run downwards only.
 """
 
 import sys
@@ -24,7 +24,7 @@ from rodcone.time_text import parse_time
 
 F = TypeVar("F", bound=Callable[..., Any])
 PACKAGES = ("render", "scenes", "sensor", "isp", "studies")
-Check = Callable[[str, Any], Any]  # takes the argument's name and value, gives what the function is called with
+Check = Callable[[str, Any], Any]  # function of an argument's name and value; it returns the value for the call
 
 
 def at(place: str) -> Any:
@@ -34,10 +34,10 @@ def at(place: str) -> Any:
 
 
 def require_no_shadow() -> None:
-    """Raise `ImportError` in one line that names the file, where a file beside the user's script has a package's name.
+    """Raise `ImportError` if a file beside the user's script has a package's name; the one line names the file.
 
-    Python finds a script `render.py` before the package `render`. Where another distribution's package stands in its
-    place, `rodcone doctor` says so.
+    Python finds a script `render.py` before the package `render`. If another distribution's package hides it instead,
+    `rodcone doctor` says so.
     """
     for name in PACKAGES:
         found = getattr(sys.modules.get(name), "__spec__", None) or (None if name in sys.modules else find_spec(name))
@@ -56,7 +56,7 @@ def _shadow_words(file: str, package: str) -> str:
 
 
 def imported(module: str) -> ModuleType:
-    """Import a module; where a file of the user's has the name of a package of ours, name the file."""
+    """Import a module; if a user's file has the name of one of our packages, the error names that file."""
     try:
         return import_module(module)
     except ModuleNotFoundError as error:
@@ -187,7 +187,7 @@ def _each_in_turn(kind: Check) -> Check:
 
 
 def _as_it_is(_: str, value: object) -> Any:
-    """Take any argument."""
+    """Accept any argument."""
     return value
 
 
@@ -203,7 +203,8 @@ _WHOLE, _NUMBER = _plain(Integral, "a whole number"), _range(-1e12, 1e12, "give 
 _TEXT, _FLAG = _plain(str, "text in quotes"), _plain(bool, "True or False")
 _PATH, _CALL = _plain((str, PathLike), "a path in quotes"), _plain(Callable, "a function")
 
-# What stands for a class of which a caller gives no object: the remedy, and what makes an object of a name or a path.
+# For each class: the remedy that an error states if an argument isn't of that class, and the function that makes an
+# object from a name or a path, if a user may give one.
 KINDS: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
         "ChannelReading": ("give rodcone.ChannelReading(...)", ""),
@@ -226,9 +227,9 @@ KINDS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "Waveform": ("give a text such as 'fluorescent@100Hz'", "sensor.flicker.waveform:waveform"),
     }
 )
-# What a type doesn't say, by the parameter's name, or the function's and the parameter's where it means something else
-# there. All other parameters are checked by their types: a class of `KINDS`, a number within the limits of its
-# `Annotated`, a text, a path.
+# Checks that a type can't state, by the parameter's name, or by the function's and the parameter's name if the
+# parameter means something else there. All other parameters are checked by their types: a class of `KINDS`, a number
+# within the limits of its `Annotated`, a text, a path.
 CHECKS: Mapping[str, Check] = MappingProxyType(
     {
         "resume": _value("render.transport:Transport", "give what render gave before"),
@@ -272,7 +273,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         **dict.fromkeys(("more", "Picture.encode.white", "row"), _as_it_is),  # checked where they are used
     }
 )
-# Functions that look at the result, and warn.
+# Functions that check the result of a public function, and warn.
 RESULTS = MappingProxyType(
     {
         "capture": ("sensor.exposure:warn_if_full", "sensor.exposure:warn_if_dark"),

@@ -9,15 +9,15 @@ from numbers import Integral, Real
 from types import UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
-MOST_TOLD = 2000  # characters; a quoted file may fill megabytes
+MOST_TOLD = 2000  # longest message [characters]; a quoted file may have megabytes
 Kinds = type[Exception] | tuple[type[Exception], ...]
 
 
 class InputError(ValueError):
     """Bad input from the caller. The message is one line; the command line prints it and exits with code 2.
 
-    A message may quote a hostile file: what a terminal would take for a command (control characters, changes of writing
-    direction) stands in it as Python's escapes, and the middle of an overlong one is left out.
+    A message may quote a hostile file. Therefore characters on which a terminal would act (control characters, changes
+    of writing direction) are replaced by Python's escapes, and the middle of an overlong message is left out.
 
     Examples
     --------
@@ -87,7 +87,7 @@ def require_range(name: str, value: object, low: float, high: float, fix: str) -
     """Raise `InputError` unless `value` is a finite number and ``low <= value <= high``."""
     try:
         number = float(value) if not isinstance(value, bool) and isinstance(value, Real) else nan
-    except OverflowError:  # whole numbers of Python go on beyond float's
+    except OverflowError:  # Python's whole numbers may exceed the range of floats
         number = nan
     exact = int(value) if isinstance(value, Integral) else number  # 2^53 + 1 is no float
     if not (isfinite(number) and low <= exact <= high):

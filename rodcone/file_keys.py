@@ -1,4 +1,4 @@
-"""Keys of other programs' files that change what is read: followed, or refused by name, from the table beside this."""
+"""Keys in other programs' files that change what is read: file_keys.toml says which are applied, and which refused."""
 
 import tomllib
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from typing import Any
 
 from rodcone.errors import InputError
 
-_LIKE = 0.85  # from which on a key is taken for another one misspelt
+_LIKE = 0.85  # similarity from which on an unknown key counts as a misspelt known one
 
 
 @cache
@@ -19,14 +19,14 @@ def formats() -> Mapping[str, Mapping[str, Any]]:
 
 
 def require_known(kind: str, keys: Mapping[str, Any]) -> None:
-    """Raise `InputError` for a key that changes values and can't be followed, or that looks like one which does.
+    """Raise `InputError` for a key that changes values and can't be applied, or that looks like a misspelt known one.
 
     Parameters
     ----------
     kind : str
         A format of the table, such as ``ENVI header``.
     keys : mapping of str to object
-        What the file holds; of ENVI texts, of others numbers or anything.
+        The file's keys and their values: texts for ENVI, any objects for other formats.
     """
     table = formats()[kind]
     applied, refused = table["applied"], table["refused"]

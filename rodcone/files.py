@@ -12,7 +12,7 @@ from typing import Any
 
 from rodcone.errors import InputError
 
-_FULL_BYTES = 1 << 16  # free on a disk that refused a write: less than a file system keeps for itself
+_FULL_BYTES = 1 << 16  # a disk that refused a write counts as full if it has less free space than this
 _HALF_WRITTEN = re.compile(r"\.rodcone-[0-9a-f]{16}(\.\w+)?")
 
 
@@ -38,7 +38,7 @@ def replacing(*paths: Path) -> Iterator[tuple[Path, ...]]:
 
 
 def _named(error: OSError, paths: Mapping[str, Path]) -> OSError:
-    """Return an error with the path that the caller named and the cause: libraries omit both where a disk is full."""
+    """Return an error with the path that the caller named and the cause; if a disk is full, libraries omit both."""
     path = paths.get(str(error.filename)) or (next(iter(paths.values())) if error.filename is None else None)
     if path is None:
         return error
@@ -48,7 +48,7 @@ def _named(error: OSError, paths: Mapping[str, Path]) -> OSError:
 
 
 def write_files(files: Mapping[Path, str | bytes | memoryview]) -> None:
-    """Write files by `replacing`, text as UTF-8 with the ends of lines that it has."""
+    """Write files by `replacing`; texts are written as UTF-8, and their line ends aren't changed."""
     with replacing(*files) as places:
         for place, content in zip(places, files.values(), strict=True):
             place.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)

@@ -1,7 +1,7 @@
 """Dr.Jit, with the LLVM library of `rodcone.llvm`. The only module that imports Dr.Jit.
 
-It does so when something of it is first asked for: Dr.Jit takes a quarter of a second and 60 MB, and neither `ple` nor
-commands that read a light from a file need it.
+The import happens when Dr.Jit is first needed, because it takes a quarter of a second and 60 MB. Neither `ple` nor
+commands that read light from a file need Dr.Jit.
 """
 
 import ctypes
@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 from rodcone.llvm import LIBLLVM  # it tells Dr.Jit where its LLVM is
 
 Backend = Literal["cuda", "llvm", "numpy"]
-# Arrays of a kernel, one value a thread. Which classes they are depends on the backend, so that a type checker takes
-# them for anything: the names tell a reader which is meant.
+# Arrays of a kernel, one value per thread. Their classes depend on the backend, so that a type checker sees only `Any`;
+# the names show a reader which class is meant.
 Float: TypeAlias = Any  # single precision
 Double: TypeAlias = Any
 UInt: TypeAlias = Any
@@ -44,10 +44,10 @@ __all__ = [
 
 
 class _Deferred(ModuleType):
-    """A module that is imported when something of it is first asked for."""
+    """A module that is imported when one of its attributes is first used."""
 
     def __getattr__(self, name: str) -> Any:
-        """Return what the module itself has under this name."""
+        """Import the module and return its attribute of this name."""
         return getattr(import_module(self.__name__), name)
 
 

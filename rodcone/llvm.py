@@ -67,8 +67,9 @@ if _early := _loaded_too_early():
         f"Dr.Jit was imported before rodcone and loaded {_early}, which aborts: nothing is rendered, reconstruction "
         f"runs its slow form; import rodcone first, or set DRJIT_LIBLLVM_PATH={LIBLLVM}",
         RuntimeWarning,
-        stacklevel=3,  # the line that imports rodcone, whose own is the second
+        stacklevel=3,  # the line that imports rodcone; level 2 is a line of rodcone's own
     )
     LIBLLVM = None
-# Without a usable library Dr.Jit would search by itself and may load one that aborts the process: name one that isn't.
+# Without a usable library Dr.Jit would search by itself, and might load one that aborts the process. Therefore it is
+# then given the name of a file that doesn't exist.
 os.environ["DRJIT_LIBLLVM_PATH"] = str(LIBLLVM) if LIBLLVM else "/nonexistent/libLLVM.so"

@@ -1,4 +1,4 @@
-"""Memory that a run needs, and a refusal where less is free: the system would kill the run without a message."""
+"""Memory that a run needs, and a refusal if less is free, because the system would kill the run without a message."""
 
 import resource
 from collections.abc import Iterator
@@ -9,27 +9,28 @@ from pathlib import Path
 from rodcone.errors import InputError
 
 GB = 1e9
-# Counted from the arrays held at once, and held against peaks that were measured (`tests/rodcone/test_memory.py`).
-TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by group and band
-_DENOISED_ARRAYS = 7  # beside those: denoised light, indirect light, folds, and their copies
-_DENOISER_BYTES = 1300  # per pixel, by Open Image Denoise
-_DENOISER_LIBRARY_BYTES = 200e6  # by its library, and by what Dr.Jit keeps of the folds' launches
-_MEANS_ARRAYS = 2  # of them that a render holds while it draws: variance comes last, when Dr.Jit's memory is free
-_LAUNCH_BYTES = 4 * (1 << 24)  # all channels of a launch at most (`render.runs.MOST_FLOATS`)
+# The numbers follow from the arrays that exist at the same time, and are compared with measured peaks in
+# `tests/rodcone/test_memory.py`.
+TRANSPORT_ARRAYS = 3  # float32 arrays (group, band, h, w) of a transport: radiance, half difference, variance
+_DENOISED_ARRAYS = 7  # further ones if it is denoised: denoised light, indirect light, folds, and their copies
+_DENOISER_BYTES = 1300  # per pixel, for Open Image Denoise
+_DENOISER_LIBRARY_BYTES = 200e6  # for its library, and for what Dr.Jit keeps of the folds' launches
+_MEANS_ARRAYS = 2  # transport arrays that exist while a render draws; variance comes last, when Dr.Jit's memory is free
+_LAUNCH_BYTES = 4 * (1 << 24)  # largest size of all channels of a launch (`render.runs.MOST_FLOATS`)
 _CHANNELS_BESIDE = 4  # channels of a launch beside its bands
-# How many launches' channels are held: what Dr.Jit keeps of one launch, its sums and their copy, in blocks of powers of
-# two; both halves' light, and the step by which the means move.
+# Memory for drawing, in multiples of all channels of a launch: what Dr.Jit keeps of one launch, its sums and their
+# copy, in blocks of powers of two; both halves' light, and the step by which the means move.
 _LAUNCHES = 4.5
-_LAST_LAUNCH = 3.0  # as many more where the last launch of a run is smaller, whose blocks Dr.Jit keeps too
-_OTHER_LAUNCHES = 1.0  # as many more for each further group, whose launches differ in size in a render of many samples
+_LAST_LAUNCH = 3.0  # added if a run has several launches: the last one is smaller, and Dr.Jit keeps its blocks too
+_OTHER_LAUNCHES = 1.0  # added per further group, whose launches differ in size if a render has many samples
 _MANY_SPP = 32  # samples per pixel from which on a render has many
 _RENDERER_BYTES = 224e6  # libraries and compiled kernels
 _RENDER_BYTES = 45  # per pixel, whatever the number of bands: order, rate, coverage, light that is seen directly
-# What follows a render beside its transport, by band: relit light, its image, both halves' light and what they are made
-# from, an image forming of one of them with its copy for the lens.
+# Arrays (band, h, w) that exist after a render beside its transport: relit light, its image, both halves' light and the
+# arrays from which they are made, and the image that is being formed of one of them, with its copy for the lens.
 _VIEW_ARRAYS = 10
-# Per pixel of a capture, which makes its light's bands one at a time: electrons behind every filter, of both halves or
-# beside a photograph's colours, their sums while an image forms, and what the raw files are made of.
+# Per pixel of a capture that computes its light's bands one at a time: electrons behind every filter, for both halves
+# or beside a photograph's colours, their sums while an image is formed, and the arrays for the raw files.
 _CAPTURE_BYTES = 185
 _VIEWER_BYTES = 212e6  # libraries, and what Dr.Jit doesn't give back
 _CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
@@ -57,7 +58,7 @@ class Limit:
     free : float
         Bytes that are not in use.
     per_process : bool
-        Whether every process has it for itself.
+        Whether the bound applies to each process separately.
     """
 
     name: str
@@ -76,38 +77,39 @@ def memory(
     held: int = 0,
     light_arrays: int | None = None,
 ) -> Memory:
-    """Return the memory that a render of so many light groups needs, or the steps after it if they need more.
+    """Return the memory that a render with `groups` light groups needs, or the steps after it if they need more.
 
     Kernels that no earlier render has left in `~/.drjit` are compiled, which takes up to 3 MB more per band.
 
     Parameters
     ----------
     pixels, bands, groups : int
-        No groups for a picture file, which needs no render.
+        Size of the render. A picture file, which needs no render, has 0 groups.
     workers : int
-        Processes that develop cells; 1: the process that renders does, 0: no cells are made here.
+        Number of processes that develop cells. 1 means the process that renders, 0 that no cells are developed.
     spp : float, optional
-        Samples per pixel of the render, at most; 0 if the light exists already; left out, many.
+        Largest number of samples per pixel; 0 if the light exists already. If it is left out, it is assumed to be
+        large.
     denoised : bool
         Whether the render is denoised.
     held : int
         Other renders of this size whose light is kept in memory meanwhile.
     light_arrays : int, optional
-        For a capture, which computes the bands that it images one at a time: how many arrays of all bands each group's
-        light takes. Left out, the light is a render's, and all of its bands are viewed together.
+        Number of arrays (band, h, w) per group in which the light is stored, for a capture that images its bands one at
+        a time. If it is left out, the light is a render's, and all bands are viewed together.
     """
-    plane = 4.0 * pixels * bands  # of float32, all bands
+    plane = 4.0 * pixels * bands  # bytes of one float32 array (band, h, w)
     per_pixel = _DENOISED_ARRAYS * groups * 4.0 * bands + _DENOISER_BYTES
     of_denoiser = denoised * (_DENOISER_LIBRARY_BYTES + pixels * per_pixel)
     # Drawing
     samples = _MANY_SPP if spp is None else spp
-    channels = 4.0 * (bands + _CHANNELS_BESIDE)  # bytes of a path of a half
+    channels = 4.0 * (bands + _CHANNELS_BESIDE)  # bytes per path of one half
     launch = _LAUNCH_BYTES if spp is None else min(_LAUNCH_BYTES, channels * pixels * max(spp, 2.0) / 2)
     launches = _LAUNCHES + _LAST_LAUNCH * (channels * pixels > _LAUNCH_BYTES)
     launches += _OTHER_LAUNCHES * max(groups - 1, 0) * min(1.0, samples / _MANY_SPP)
     drawing = max(_MEANS_ARRAYS * groups * plane + launches * launch, TRANSPORT_ARRAYS * groups * plane)
     drawing += _RENDERER_BYTES + _RENDER_BYTES * pixels
-    # Looking at what was drawn, and developing it: the render is let go of before the first cell
+    # Viewing and developing the light; the render is released before the first cell
     arrays = TRANSPORT_ARRAYS if light_arrays is None else light_arrays
     viewing = _VIEWER_BYTES + arrays * groups * plane
     viewing += _VIEW_ARRAYS * plane if light_arrays is None else _CAPTURE_BYTES * pixels
@@ -147,7 +149,7 @@ def memory_limits(root: Path = Path("/")) -> Iterator[Limit]:
     Parameters
     ----------
     root : Path
-        Under which ``proc`` and ``sys`` lie.
+        Folder that contains ``proc`` and ``sys``.
     """
     with suppress(OSError, LookupError, ValueError):
         lines = (root / "proc/meminfo").read_text().splitlines()

@@ -1,7 +1,7 @@
 """Libraries that only some uses need, imported at their first use.
 
-What they warn about at their own import (a deprecated name of SciPy's, Matplotlib that is absent) is not about their
-use here, and kept quiet.
+Their warnings at their own import (about a deprecated name of SciPy's, or absent Matplotlib) don't concern their use
+here, and are suppressed.
 """
 
 import warnings
@@ -26,7 +26,7 @@ def optional_library(name: str, extra: str) -> Any:
 
 
 def quietly_imported(name: str) -> Any:
-    """Return a module, its own import's warnings left out."""
+    """Import a module while suppressing warnings, and return it."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return import_module(name)

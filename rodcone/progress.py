@@ -13,10 +13,10 @@ from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, Task, TimeElapsedColumn
 
 Step: TypeAlias = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
-LINE_EVERY_S = 5.0
-SHOW_EVERY_S = 0.2  # in a notebook
-LEAST_COMPILE_S = 1.0  # a shorter one is no reason to wonder
-START = "start"  # what a task says before its first step
+LINE_EVERY_S = 5.0  # time from line to line in a log
+SHOW_EVERY_S = 0.2  # least time between two updates in a notebook
+LEAST_COMPILE_S = 1.0  # shortest compilation that is reported
+START = "start"  # text of a task before its first step
 
 
 @contextmanager
@@ -24,9 +24,9 @@ def progress(file: TextIO) -> Iterator[Step]:
     """Yield a function to call with what is being done and the share of the whole that is done (0..1).
 
     On a terminal it moves a bar, which vanishes at the end. Elsewhere, as in the log of a batch system, a line is
-    printed every five seconds if there is something new. The share only grows. Both show the time left, by the pace
-    since the first share above 0, because what comes before, such as compilation, isn't repeated. Until then the bar
-    swings to and fro.
+    printed every five seconds if there is something new. The share only grows. Bar and line show the time left,
+    by the pace since the first share above 0, because what comes before, such as compilation, isn't repeated. Until
+    then the bar swings to and fro.
     """
     console = Console(file=file)
     *columns, time_left = Progress.get_default_columns()

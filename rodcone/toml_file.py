@@ -1,6 +1,6 @@
 """TOML with limits on size, nesting and whole numbers, which Python's parser lacks, and its tables as dataclasses.
 
-They are read strictly: unknown keys and values of another kind are errors by name.
+The tables are read strictly: an unknown key or a value of another kind is an error that names the key.
 """
 
 import re
@@ -85,7 +85,7 @@ def structured(content: object, kind: type[Kind], converter: Converter, fix: str
     Parameters
     ----------
     content : dict
-        As `rodcone.toml_file.read_toml` returns it.
+        Table, as `read_toml` returns it.
     fix : str
         Where to look for what is allowed, such as ``see rodcone new study``.
 
@@ -111,7 +111,7 @@ def _is_plain_union(kind: object) -> bool:
 
 
 def _one_of(*kinds: type) -> Callable[[Any, Any], Any]:
-    """Return a hook that accepts a value of one of these kinds, and gives it the first kind that fits."""
+    """Return a hook that accepts a value of one of these kinds, and converts it to the first kind that fits."""
     plain = [kind for kind in kinds if kind in _WORDS]
 
     def take(value: object, _: object) -> Any:
