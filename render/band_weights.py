@@ -1,11 +1,11 @@
-"""Integrals of a curve and light that is known by its band means: the weight of each band, and the error that is left.
+"""Integrals of a curve times light that is known only by its band means: a weight per band, and the error that remains.
 
 Light within a band is a transport T (what surfaces and paths make of a lamp) times the lamp's own spectrum S. T is
 smooth, and S is known to the last line. The integral of a curve Q over the light is therefore the integral of S Q T, in
 which T is interpolated from its band means. For the interpolation, T is taken as a Gaussian process over wavelength:
 its covariance gives the weights of least expected squared error, and that error (Rasmussen & Williams, "Gaussian
 Processes for Machine Learning", 2.25; integrals as O'Hagan 1991, "Bayes-Hermite quadrature"). Weights are at least 0.
-If the best ones would raise a render's noise by more than 5 %, the weights of least error within that limit are taken.
+If the best ones would raise a render's noise by more than 5 %, the weights of least error within that limit are used.
 """
 
 from collections.abc import Callable
@@ -24,18 +24,18 @@ Curves = Callable[[Floats], Floats]  # wavelengths (n,) [nm] to values (curve, n
 # Covariance of T: Matern's of order 5/2, variance 1, on a mean that may be anything. With this length the expected
 # error of chart patches is 0.7 to 2.4 times what it is (benchmarks/bands.py), and the weights hardly depend on it.
 LENGTH_NM = 100.0
-_MEAN_VARIANCE = 100.0  # variance of T's mean, which keeps the sum of weights while they are brought to 0 or more
-_ROUNDING = 1e-9  # variance of a band mean's own error, without which bands of 1 nm can't be told apart
-_STEP_NM = 2.5  # longest piece that the quadrature takes at once
+_MEAN_VARIANCE = 100.0  # assumed variance of T's mean; it keeps the weights' sum while negative ones are removed
+_ROUNDING = 1e-9  # variance of a band mean's own error, without which the covariance of bands of 1 nm is singular
+_STEP_NM = 2.5  # longest piece that the quadrature covers with one pair of nodes
 NARROW_NM = 2.0  # T is as good as constant within a band of at most this width
 _NODES = np.array([-1.0, 1.0]) / 3**0.5  # Gauss-Legendre, exact for cubics
-_IN_BAND, _IN_BAND_SHARES = np.polynomial.legendre.leggauss(4)
+_IN_BAND, _IN_BAND_SHARES = np.polynomial.legendre.leggauss(4)  # nodes and weights of means over a band
 _LEAST_BESIDE_DARK = 1e-2  # a lamp is one of few lines if bands beside dark ones hold more than this share of its light
 LEAST_LIGHT = 1e-6  # share of the brightest band's light, below which a band is dark and says nothing about T
 _TOUCH, _AS_WIDE = 0.02, 1.5  # neighbouring bands: largest gap over their width, and largest ratio of their widths
 _LEAST_NEGATIVE = 1e-9  # share of the largest weight that a negative weight may have by rounding
 MOST_NOISE = 1.05  # largest noise of weights, over that of products of averages
-_MEASURED = 3e-4  # error of a file's band means, in shares of the brightest band's
+_MEASURED = 3e-4  # error of a file's band means, as a share of the brightest band's mean
 _RIDGES = (1e-8, 10.0)  # smallest and largest ridge tried, in units of T's variance
 _HALVINGS = 12  # steps of the search between them, which finds a ridge within 0.5 %
 
@@ -109,7 +109,7 @@ def points_of(knots_nm: Floats, wavelength_nm: Floats, width_nm: Floats, light: 
     knots_nm : (n,) float64
         Wavelengths at which the curves have corners or steps; the light's own are added.
     light : LampSpectrum, optional
-        Left out, it is the same at all wavelengths.
+        The lamp. If it is left out, light is the same at all wavelengths.
     """
     knots = knots_nm if light is None else np.concatenate([knots_nm, light.wavelength_nm])
     knots = np.unique(knots)
@@ -151,7 +151,7 @@ def band_weights(
         Where the curves have corners or steps.
     wavelength_nm, width_nm : (band,) float64
     light : Spectrum, optional
-        The lamp, up to a factor; None where it isn't known: the light itself is then taken as smooth.
+        The lamp, up to a factor. None means that it isn't known; the light itself is then assumed to be smooth.
     most_noise : float
         Largest noise of the weights, over the noise of plain products of averages. Each band is taken to have an
         independent relative error of the same size.
@@ -185,8 +185,8 @@ def transport_weights(
 ) -> tuple[Floats, Floats]:
     """Return the weights that turn band means of transport into the integral of each curve over a lamp's light on it.
 
-    Parameters are those of `band_weights`. For a lamp of few lines dark bands count too, because what surfaces do
-    beside a line tells what they do at it. Some weights may then be negative.
+    Parameters are those of `band_weights`. For a lamp of few lines dark bands count too, because reflection beside a
+    line shows what reflection is at the line. Some weights may then be negative.
 
     Returns
     -------
@@ -216,14 +216,14 @@ def transport_of_light(
 ) -> Floats:
     """Return the weights by which true band means of light give T's means in finer bands, shape (finer band, band).
 
-    A renderer's or a spectrometer's value is the mean of the product S T in a band, so that it tells of T most where
-    the lamp has its lines. T in the finer bands is what the Gaussian process expects of it, with these means known; its
-    own mean may be anything (universal kriging).
+    A renderer's or a spectrometer's value is the mean of the product S T in a band, so that it depends on T mainly at
+    the lamp's lines. T in the finer bands is the expectation of the Gaussian process given these means, where the
+    process's own mean may be anything (universal kriging).
 
     Parameters
     ----------
     wavelength_nm, width_nm : (band,) float64
-        Of the light that is known. A band that the lamp leaves dark tells nothing.
+        Bands in which the light is known. A band that the lamp leaves dark isn't used.
     light : Spectrum
         The lamp.
     finer_nm, finer_width_nm : (finer band,) float64
@@ -276,7 +276,7 @@ class Interpolation:
         values : (curve, n) float64
             The curves at the points.
         most_noise : float
-            As of `band_weights`.
+            As in `band_weights`.
         """
         result = self._of_ridge(values, 0.0)
         run = self.points.run[self.known]
@@ -358,9 +358,9 @@ def _means(covariance: Floats) -> Floats:
 
 
 def _least(root: Floats, target: Floats, ridge: float) -> Floats:
-    """Find the weights, at least 0 and of the sum of `target`, that are nearest to it in expected error.
+    """Find the weights w of at least 0 that minimise |root (w - target)|^2 + ridge |w|^2; scale them to `target`'s sum.
 
-    `ridge` times the sum of their squares is added to that error.
+    The first term is the expected error beyond that of `target`, the weights of least error of any sign.
     """
     most = np.abs(target).max()
     rows = np.vstack([root, ridge**0.5 * np.eye(target.size)]) if ridge else root
@@ -370,7 +370,7 @@ def _least(root: Floats, target: Floats, ridge: float) -> Floats:
 
 
 def _within_noise(best: Floats, of_ridge: Callable[[float], Floats], most: float) -> Floats:
-    """Return `best` if its noise is at most `most`; else the weights of the smallest ridge that keeps to it."""
+    """Return `best` if its noise is at most `most`, else the weights of the smallest ridge whose noise is."""
     if _noise(best) <= most:
         return best
     low, high = _RIDGES

@@ -87,8 +87,8 @@ def save_transport(folder: Path, scene: Scene, film: Film, seed: int, transport:
 def kept_beside(out: Path) -> Iterator[Path]:
     """Give a folder that keeps a render until the file made from it is written, so that a failure doesn't lose it.
 
-    The folder lies beside the file and is removed once the file is there. An error says that the same command goes on
-    from the kept render. If the render itself is refused, there is no folder.
+    The folder lies beside the file and is removed once the file is there. If there is an error, its note says that the
+    same command continues from the kept render. If the render itself is refused, there is no folder.
     """
     folder = _folder_beside(out)
     try:
@@ -167,7 +167,7 @@ def _path(folder: Path, scene: Scene, film: Film, seed: int, kind: str = "render
 
 
 def scene_terms(scene: Scene, film: Film) -> list[Any]:
-    """List all that decides a scene's light transport on a film; lamps' spectra and powers and the engine don't."""
+    """List all that decides a scene's light transport on a film, except the engine; lamps' spectra and powers don't."""
     groups = [[name, group.emitters, group.coloured] for name, group in scene.groups.items()]
     return [scene.name, scene.geometry, scene.reference_plane, file_digests(scene.geometry), groups, film]
 

@@ -146,7 +146,7 @@ def _with_referred(node: Node, parts: Mapping[str, Node]) -> Iterator[Node]:
 
 
 def _matrix(transform: object) -> Floats:
-    """Return the upper 3x4 of a `to_world` in any of its forms; of the identity if there is none."""
+    """Return the upper 3x4 of a `to_world` in any of its forms; that of the identity if there is none."""
     if transform is None:
         return np.eye(4)[:3]
     return np.array(getattr(transform, "matrix", transform), np.float64).reshape(4, 4)[:3]

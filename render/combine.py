@@ -38,7 +38,7 @@ def combine(maps: Floats, planes: Planes) -> Planes:
     sums = dr.empty(types.Float, bands * pixels)
     index = dr.arange(types.UInt, pixels)
     most = max(groups, *map(len, read))
-    for band, chosen in enumerate(read):  # a kernel each, all of one code; arrays of the host are read where they are
+    for band, chosen in enumerate(read):  # one launch per band of one kernel; arrays in host memory are read in place
         total = types.Float64(0)
         padded = [*chosen, *[0] * (most - chosen.size)]
         for number, plane in enumerate(padded):

@@ -63,7 +63,7 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
     ----------
     scene : Scene
     size : (int, int) or int
-        Height and width in pixels, or the longer side, of which the other follows from the scene's own proportions.
+        Height and width in pixels, or the longer side alone, from which the scene's proportions give the other.
     wavelength_nm, width_nm : (band,) array_like, optional
         Band centres and widths; 20 bands of 20 nm over 380-780 nm by default. `render.spectrum.line_bands` gives
         emission lines bands of their own.
@@ -72,7 +72,7 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
         `Transport.counts` holds the samples of each pixel. If `spp` exceeds 64, a pilot of 32 samples, which aren't
         counted, first finds the pixels that need more. Every pixel gets at least a quarter of the mean.
     max_spp : int, optional
-        The same, as a ceiling that may stand beside `noise` or `max_seconds`.
+        The same, as a ceiling that may be combined with `noise` or `max_seconds`.
     noise : float, optional
         Relative Monte Carlo error to reach: median over pixels and bands, with variance pooled over 3x3 pixels, under
         the scene's own lights. It is checked from 16 samples on, at powers of two and half-way between them.

@@ -22,7 +22,8 @@ class Halves:
     ----------
     mean : (..., h, w) float32
     difference : (..., h, w) float32
-        Half the difference between the even and the odd half: one draw of the error of `mean`, all correlations kept.
+        Half the difference between the even and the odd half. It is a random draw of the error of `mean`, with all its
+        correlations.
     """
 
     mean: Planes
@@ -49,7 +50,9 @@ class Halves:
         Parameters
         ----------
         even, odd : (..., pixel) float32
+            Means a and b of the chunk's points in the two halves.
         weight : float32
+            Weight w of the chunk in the mean of all points so far.
         at : slice or (pixel,) int
             The pixels, counted row by row. A pixel that occurs twice must have the same light both times.
         """
@@ -104,14 +107,14 @@ def pooled(planes: Planes) -> Planes:
 
 @dataclass(frozen=True)
 class GroupError:
-    """A light group's error as half the difference of the halves shows it, in two independent parts.
+    """A light group's error, which is half the difference of the halves, in two independent parts.
 
     Attributes
     ----------
     scattered : (band, h, w) float32
         Error of scattered light, scaled to a pixel of rate 1.
     rim : (band, h, w) float32
-        Error at the rim of a visible lamp, which too many or too few of a pixel's samples meet.
+        Error at the rim of a visible lamp, where too many or too few of a pixel's samples meet the lamp.
     scale : (band, h, w) float32
         Square root of the ratio of scattered light to its mean over 3x3 pixels.
     """
@@ -121,7 +124,7 @@ class GroupError:
     scale: Planes
 
     def covariance(self, other: "GroupError", rates: NDArray[np.uint32]) -> Planes:
-        """Estimate the covariance with another group's error, or with itself the variance: (band, h, w).
+        """Estimate the covariance with another group's error, or the variance if `other` is itself: (band, h, w).
 
         The variance of scattered light is pooled over 3x3 pixels relative to the light, because across an edge variance
         over mean changes far less than variance. A lamp's rim is not pooled, since a lamp is thousands of times
@@ -139,6 +142,9 @@ def group_errors(
 
     Parameters
     ----------
+    light : Halves of (group, band, h, w)
+    seen : sequence of Halves of (1 or band, h, w)
+        Directly visible light of each group.
     coverage : (h, w) float32
         Share of the samples that meet a lamp first. Where more of them do, fewer meet what lies behind the lamp.
     rates : (h, w) uint32

@@ -81,9 +81,9 @@ def thin_lens(camera: Mapping[str, Any], pupil_m: float, focus_m: float) -> dict
     Parameters
     ----------
     camera : mapping
-        Of Mitsuba's type ``perspective``, or ``thinlens``, whose own lens is replaced.
+        Camera of Mitsuba's type ``perspective``, or ``thinlens``, whose own lens is replaced.
     pupil_m, focus_m : float
-        Diameter of its pupil, and the distance of focus, in the scene's unit of length.
+        Diameter of the pupil, and distance of focus, in the scene's unit of length.
 
     Raises
     ------

@@ -37,9 +37,9 @@ _TEMPERATURE = re.compile(r"(D?)(\d+(?:\.\d+)?) ?K")
 def illuminant_names() -> tuple[str, ...]:
     """List the names that `illuminant` knows, besides a temperature such as ``3000K`` or ``D7000K``.
 
-    Most are tables of CIE 015:2018 in steps of 5 nm. F11 stands for narrow-band fluorescent lamps, HP1 for standard
-    high-pressure sodium lamps, LED-B3 for a white LED of 4100 K, LED-RGB1 for a lamp of three LEDs and LED-V1 for a
-    white LED with a violet pump.
+    Most are tables of CIE 015:2018 in steps of 5 nm. F11 is a narrow-band fluorescent lamp, HP1 a standard
+    high-pressure sodium lamp, LED-B3 a white LED of 4100 K, LED-RGB1 a lamp of three LEDs and LED-V1 a white LED with a
+    violet pump.
 
     Examples
     --------
@@ -51,7 +51,7 @@ def illuminant_names() -> tuple[str, ...]:
 
 
 def lines_nm(name: str) -> tuple[float, ...]:
-    """Return a named light's emission lines [nm], which `line_bands` takes; no line if its spectrum is smooth.
+    """Return a named light's emission lines [nm], for `line_bands`; an empty tuple if its spectrum is smooth.
 
     Raises
     ------

@@ -13,8 +13,8 @@ from rodcone.errors import InputError, require_fields
 DEFAULT_SPP = 64
 PILOT_FROM = 64  # samples per pixel, above which a pilot render shows where they are needed
 MOST_POINTS = 1 << LOG2_POINTS  # largest number of points of each half, in the mean over the picture
-MOST_SPP = 2 * MOST_POINTS  # ceiling if only an error is asked for
-LEAST_POINTS = 8  # points of each half from which on an error is believed
+MOST_SPP = 2 * MOST_POINTS  # largest allowed limit, and the ceiling if only an error or a time is asked for
+LEAST_POINTS = 8  # points of each half from which on the error is reliable enough to stop
 A_POWER = 8  # chunks from one power of two to the next, so that at most an eighth more is drawn than asked for
 
 
@@ -30,7 +30,7 @@ class Limits:
     Attributes
     ----------
     spp, max_spp : int or None
-        Samples per pixel; `max_spp` may stand beside another limit.
+        Samples per pixel; `max_spp` is meant to be combined with another limit.
     noise : float or None
         Relative Monte Carlo error to reach.
     max_seconds : float or None

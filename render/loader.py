@@ -83,14 +83,14 @@ def own_mitsuba_variant() -> Iterator[None]:
 
 
 def mitsuba_words(error: BaseException) -> str:
-    """Put Mitsuba's message on one line, without source locations, and with objects' names for their descriptions."""
+    """Return Mitsuba's message on one line, without source locations, and with names in place of descriptions."""
     without_places = re.sub(r"\[\w+\.cpp:\d+\] ", "", one_line(error))
     return re.sub(r'\[ name = ("[^"]*"),.* \]', r" \1", without_places)
 
 
 @dataclass(frozen=True)
 class Film:
-    """Size and bands that a render records, and how deep its paths go.
+    """Size and bands that a render records, and the largest depth of its paths.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class Film:
     max_depth : int
         Longest path in segments; 1 is emission alone, 2 direct light.
     rr_depth : int
-        As of `Scene`.
+        As in `Scene`.
     """
 
     size: tuple[int, int]
@@ -118,7 +118,7 @@ class LoadedScene:
     ----------
     mi_scene : mitsuba.Scene
     groups : tuple of int
-        Indices of the scene's groups that it gives. A second one is the constant environment, which isn't in
+        Indices of the groups whose light is rendered. A second one is the constant environment, which isn't in
         `mi_scene`: paths that escape bring its light.
     coloured : bool
         Whether emission depends on wavelength; at unit emission it is evaluated once.
@@ -156,7 +156,7 @@ def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[Load
     along = [] if len(names) == 1 else [x for x in names if is_environment(scene, x)][:1]
     launched = [name for name in names if name not in along]
     geometry, curves = with_rows(with_matte_surfaces(scene.geometry))
-    scene = replace(scene, geometry=geometry, extend=None)  # held ends are in the geometry by now
+    scene = replace(scene, geometry=geometry, extend=None)  # the geometry already contains the continued tables
     scene = _with_common_shapes(scene) if len(launched) > 1 else scene
     loaded = [_load_group(scene, name, film, curves, metered) for name in launched]
     if along:
@@ -203,14 +203,14 @@ def _is(part: object, kind: object) -> bool:
     if any(node.get("type") == "ref" for _, node in walk({"": part})):
         return False
     mi = mitsuba_module()
-    python_plugins = {"matte": mi.ObjectType.BSDF}  # a plug-in written in Python, whose kind Mitsuba doesn't tell
+    python_plugins = {"matte": mi.ObjectType.BSDF}  # a plug-in written in Python, whose kind Mitsuba doesn't know
     return bool(kind == (python_plugins.get(part["type"]) or mi.PluginManager.instance().plugin_type(part["type"])))
 
 
 def _load_group(scene: Scene, group: str, film: Film, curves: tuple[Spectrum, ...], metered: bool) -> LoadedScene:
     """Load a scene with one light group at unit spectral emission (or its own colours).
 
-    `curves` are those of the table that the scene's matte surfaces name the rows of.
+    `curves` are the rows of the table to which the scene's matte surfaces refer.
     """
     description = scene.lit({group: uniform_node(1.0)})
     description["sensor"] = {**description["sensor"], "film": _recorder(film.size)}

@@ -21,7 +21,7 @@ HALF_SPP = 16  # samples per pixel of its film in each half: 2^17 paths give eac
 
 @dataclass(frozen=True)
 class Meter:
-    """Meter of a scene's irradiance, which traces it at the first call and keeps it.
+    """Meter of a scene's irradiance, which is traced at the first call and then kept.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Meter:
         Bands and longest path; its size isn't used.
     seed : int
     folder : Path, optional
-        Folder of renders, from which an irradiance that was traced before is taken.
+        Folder of renders, in which an irradiance is stored and looked for.
     """
 
     scene: Scene

@@ -1,4 +1,4 @@
-"""Spectral radiance of an image, which is the light that a camera takes."""
+"""Spectral radiance of an image, which is the light that enters a camera."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -37,7 +37,7 @@ class SpectralRadiance:
         Whether values may be negative, as in half of a render, whose noise may exceed its light.
     light : Spectrum, optional
         The lamp behind the values, up to a factor; integrals over bands then follow its lines and slopes. If it is None
-        (unknown, or not one lamp on smooth surfaces), the values themselves are taken as smooth over wavelength.
+        (unknown, or not one lamp on smooth surfaces), the values themselves are assumed to be smooth over wavelength.
     horizontal_view_deg : float, optional
         Field of view across the picture [degrees], as an ISETCam scene states it.
 
@@ -179,7 +179,7 @@ class BandRadiance:
         Height and width in pixels.
     wavelength_nm, widths_nm : (band,) float64
     relative_mc_error, relative_level_error, signed, light, horizontal_view_deg
-        As of `SpectralRadiance`.
+        As in `SpectralRadiance`.
     """
 
     make: Callable[[int], Planes]

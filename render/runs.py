@@ -36,7 +36,7 @@ from rodcone.types import Floats, Planes
 
 MOST_FLOATS = 1 << 24  # floats in all channels of one launch (64 MiB); they limit how many threads a launch has
 PILOT = Span(0, 8, 2)  # points of each half: 32 samples per pixel, in four sets
-_PILOT_STREAM = 8
+_PILOT_STREAM = 8  # number of the pilot's random stream
 BLOCK = 1 << 16  # pixels whose errors are summed in double precision at once
 
 
@@ -125,7 +125,7 @@ def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32], *, split: bool
 
 
 def means_of(transport: Transport, *, split: bool = False) -> Means:
-    """Return the means at which an earlier render stopped, so that this one continues with the same bits, in place."""
+    """Return the means at which an earlier render stopped, to be continued with the same bits; arrays aren't copied."""
     denoised = transport.denoised if split else None
     return Means(
         count=int(transport.counts.min()) // 2,
@@ -157,7 +157,7 @@ def fields_of(lights: Floats, means: Means) -> dict[str, Any]:
 
 
 def error_of(lights: Floats, means: Means) -> float:
-    """Return only the relative error of `fields_of`; it computes only those rows whose pixels the error takes."""
+    """Return only the relative error of `fields_of`, computed only in those rows whose pixels it depends on."""
     light = means.light.mean
     chosen = spread_pixels(light.shape[2:])
     _, rows, columns = chosen

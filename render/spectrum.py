@@ -24,14 +24,15 @@ from rodcone.types import Floats as Floats  # noqa: PLC0414  (other packages imp
 from rodcone.types import real_array
 
 VISIBLE_NM = (380.0, 780.0)
-SHORTEST_NM, LONGEST_NM = 100.0, 20_000.0  # what is taken for a wavelength in nm: from the far ultraviolet to heat
+SHORTEST_NM, LONGEST_NM = 100.0, 20_000.0  # range of numbers that may be wavelengths in nm: far ultraviolet to heat
 MOST_OVERLAP = 0.01  # share of the narrower of two bands that may overlap by rounding of stated edges
-LINE_BASE_NM = 0.1  # far under any band, so that a line's shape doesn't matter
-LINE_REACH_NM = 0.5  # from a line to the edges of its band: wide enough for a lamp's own width and tabulation
+LINE_BASE_NM = 0.1  # width of a line at its base, far below that of any band, so that a line's shape doesn't matter
+LINE_REACH_NM = 0.5  # distance from a line to its band's edges: enough for a lamp's line width and its tabulation
 LEAST_LINE = 1e-3  # least share of a light's power in a line; smaller peaks are noise of a finely measured curve
 OBSERVER_NM: Floats = np.arange(360.0, 831.0)  # corners of the CIE 1931 observer
 DEFAULT_WAVELENGTH_NM: Floats = np.arange(385.0, 780.0, 10.0)  # centres of 40 bands that fill 380-780 nm
-RENDER_BAND_NM = 20.0  # charts' electrons then err by 0.05 % under smooth light and 0.3 to 1.6 % under lamps of lines
+# Default width of a render's bands: electrons of charts err by 0.05 % under smooth light, by 0.3 to 1.6 % under lines.
+RENDER_BAND_NM = 20.0
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ class Spectrum:
 
 
 def flat(value: float = 1.0) -> Spectrum:
-    """Return a spectrum of one value over 300-1100 nm, which covers all bands that the project uses."""
+    """Return a spectrum with one value over 300-1100 nm, which covers all bands that the project uses."""
     return Spectrum(np.array([300.0, 1100.0]), np.array([value, value]))
 
 
@@ -168,7 +169,7 @@ def line_bands(
 
 
 def emission_lines_nm(spectrum: Spectrum) -> Floats:
-    """Find a spectrum's emission lines [nm] (`line_spectrum`): peaks under 0.2 nm wide and twice their neighbours."""
+    """Find a spectrum's emission lines [nm]: peaks at most 0.2 nm wide, over twice as high as their neighbours."""
     nm, values = spectrum.wavelength_nm, spectrum.values
     beside = np.maximum(values[:-2], values[2:])
     power = values[1:-1] * (nm[2:] - nm[:-2]) / 2

@@ -97,7 +97,7 @@ def _number(mi: ModuleType, shape: Any) -> Any:
 
 
 def _materials(scene: Scene, objects: tuple[str, ...]) -> dict[str, str]:
-    """Find for each object the first object of the same material: all parts of the two except lights are equal."""
+    """Find for each object the first object of the same material, which has equal parts except lights."""
     first = dict[str, str]()
     result = {}
     for name in objects:

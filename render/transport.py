@@ -54,21 +54,21 @@ class Transport:
         Samples of each pixel, both halves together; a pixel that is noisier than others has more.
     stopped_by : "samples", "noise", "seconds" or "interrupt"
     seconds : float
-        Time of all calls of `render` that it took.
+        Time of all calls of `render` that made it.
     integrator, variant : str
     relative_mc_error : float
         Error reached under the scene's own lights: median over pixels and bands of standard error over mean.
     shared : SharedPaths or None
         Two groups whose errors are correlated, since a constant environment is rendered along with another group.
     meter : callable or None
-        Function that gives the irradiance on the scene's reference plane, and traces it at the first call; None without
-        a plane.
+        Function that returns the irradiance on the scene's reference plane, which is traced at the first call; None
+        without a plane.
     denoised : Denoised or None
         Denoised light beside the unbiased light, if it was asked for (`render.denoised.relight`).
     horizontal_view_deg : float or None
         Angle of view of the scene's camera across the picture; None if it has none.
     compile_s : float
-        Time in which kernels were compiled for it; 0 if kernels or light were already there.
+        Time in which kernels were compiled for this render; 0 if kernels or light already existed.
     """
 
     light: Halves
@@ -239,9 +239,9 @@ class Transport:
         powers: Powers | None = None,
         responses: Mapping[str, Spectrum] | None = None,
     ) -> dict[str, float]:
-        """Estimate how far the width of the bands puts off the light that each curve collects, RMS over pixels.
+        """Estimate the relative error, by the bands' width, of the light that each curve collects, RMS over pixels.
 
-        The relative error is what is expected for surfaces as rough over wavelength as those of the scene
+        It is the error that is expected for surfaces as rough over wavelength as those of the scene
         (`render.bands.error`); lamps are known to their lines.
 
         For a file of radiance whose lamp was named (`render.bands.known_lamp`), the error of the file's own bands isn't
@@ -256,13 +256,13 @@ class Transport:
         spectra, powers
             As in `relight`.
         responses : mapping of str to Spectrum, optional
-            Electrons per photon of a camera's channels, as ``sensor.responses.curves``; left out, the CIE 1931
+            Electrons per photon of a camera's channels, as ``sensor.responses.curves``; by default the CIE 1931
             observer's x, y and z.
 
         Returns
         -------
         dict of str to float
-            By curve.
+            Relative error by curve.
         """
         if responses is not None:
             require_kind("responses", responses, Mapping, "give sensor.responses.curves")

@@ -1,7 +1,7 @@
 """Error that remains because light is known only by its band means, in what the eye and a camera's channels collect.
 
 A lamp's spectrum is known to its lines (`render.band_weights`). What isn't known is how surfaces vary within a band,
-beyond what neighbouring bands tell. The error is the expected error of a Gaussian process. Its variance is estimated
+beyond what neighbouring bands show. The error is the expected error of a Gaussian process. Its variance is estimated
 from the scene: the squared second differences of the transport over wavelength, divided by their expected value for a
 process of variance 1.
 """
@@ -26,12 +26,12 @@ LEAST_SIGNAL = 0.02  # share of x, y and z together; an observer curve that coll
 
 
 class WideBandsWarning(UserWarning):
-    """Warning that surfaces vary within bands by more than neighbouring bands tell."""
+    """Warning that surfaces vary within bands by more than neighbouring bands show."""
 
 
 @dataclass(frozen=True)
 class CurveTerms:
-    """Weights for the integral of curves over one lamp's light, and what its expected error is computed from.
+    """Weights for the integral of curves over one lamp's light, and numbers for its expected error.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class CurveTerms:
     deviation : (curve,) float64
         Expected error of each integral, for transport of variance 1.
     differences : (difference, band) float64
-        Matrix that takes band means to the part of each band's mean that its neighbours don't predict.
+        Matrix that gives, from band means, the part of each band's mean that its neighbours don't predict.
     expected : (difference,) float64
         Expected square of each difference, for transport of variance 1.
     centre : (difference,) int
@@ -68,12 +68,12 @@ def curve_error(
     ----------
     lights : mapping of str to LightGroup
     mixture : BandLight
-        The same lights as the picture holds them.
+        The same lights as they are in the picture, referred to one spectrum.
     radiance : (group, band, h, w) float32
-        At unit spectral emission.
+        Radiance at unit spectral emission.
     wavelength_nm, width_nm : (band,) float64
     responses : mapping of str to Spectrum, optional
-        Electrons per photon; left out, the CIE 1931 observer's x, y and z.
+        Curves in electrons per photon, by default the CIE 1931 observer's x, y and z.
     """
     names = ["x", "y", "z"] if responses is None else list(responses)
     chosen = radiance[spread_pixels(radiance.shape[2:])].astype(np.float64)
@@ -90,12 +90,12 @@ def curve_error(
             terms = curve_terms(curves, knots_nm, wavelength_nm, width_nm, light.spectrum)
         total += light.power * np.tensordot(terms.weights, transport, 1)
         missed += light.power * _missed(terms, transport)
-        if together is not None:  # what the lamps' common spectrum makes of this one's light
+        if together is not None:  # error by the lamps' common spectrum in place of this lamp's
             moved += np.tensordot(together @ light_map - light.power * terms.weights, transport, 1)
     relative = np.divide(np.hypot(missed, moved), total, out=np.zeros_like(total), where=total > 0)
     lit = np.maximum((total > 0).sum(axis=(1, 2)), 1)
     errors = np.sqrt(np.square(relative).sum(axis=(1, 2)) / lit)
-    if responses is None:  # a curve that nearly nothing reaches isn't seen
+    if responses is None:  # a curve that collects nearly nothing isn't judged
         share = total.sum(axis=(1, 2)) / max(float(total.sum()), np.finfo(float).tiny)
         errors = np.where(share >= LEAST_SIGNAL, errors, 0.0)
     return dict(zip(names, errors.tolist(), strict=True))

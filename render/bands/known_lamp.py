@@ -3,7 +3,7 @@
 A file of another program, or of a spectrometer, holds the mean of the light in each band. Which share of it lies at a
 lamp's lines depends on how surfaces vary within the band, which `render.band_weights` estimates from all bands at once.
 It is kept in bands of at most 10 nm: in bands of 20 nm electrons of chart patches would be up to 2 % off under F11 and
-the weights would turn up noise by up to 29 %; in bands of 10 nm they are within 0.2 % and 5 % (`benchmarks/bands.py`).
+the weights would raise noise by up to 29 %; in bands of 10 nm they are within 0.2 % and 5 % (`benchmarks/bands.py`).
 """
 
 import warnings
@@ -26,7 +26,8 @@ class OtherLampWarning(UserWarning):
 def over_lamp(radiance: SpectralRadiance, lamp: Spectrum) -> SpectralRadiance | None:
     """Convert radiance to the transport that gives this radiance under a lamp.
 
-    Return None if the lamp can't be behind the picture, or if its spectrum is constant, which tells nothing.
+    Return None if the lamp can't be behind the picture, or if its spectrum is constant, so that there are no lines to
+    follow.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
-"""Several lamps as light of one spectrum within each band: what `render.band_weights` needs of a scene of many lights.
+"""Conversion of several lamps' light to light of one spectrum, which `render.band_weights` needs.
 
-A picture holds the sum of its light groups, but weights of bands follow one spectrum. Where groups differ, all are
-referred to the spectrum of their mixture: each group's light is redistributed among neighbouring bands, so that its
-integrals over smooth curves, taken with the mixture's spectrum, equal those with its own spectrum. This is linear in
-the transport, so it costs a few more additions in relighting and nothing afterwards. A lamp of few lines is treated in
-the same way: the dark bands beside a line say how surfaces reflect at the line, and that goes into the line's band.
+A picture is the sum of its light groups, but the weights of bands follow one spectrum. If the groups' spectra differ,
+all are referred to the spectrum of their mixture: each group's light is redistributed among neighbouring bands, so that
+its integrals over smooth curves, taken with the mixture's spectrum, equal those with its own spectrum. This is linear
+in the transport, so it costs a few more additions in relighting and nothing afterwards. A lamp of few lines is treated
+in the same way: the dark bands beside a line say how surfaces reflect at the line, and that goes into the line's band.
 """
 
 from collections.abc import Mapping
@@ -30,7 +30,8 @@ class BandLight:
     Attributes
     ----------
     spectrum : Spectrum or None
-        Spectrum that all lights share, or that of their mixture, up to a factor; None where nothing shines.
+        Spectrum that all lights share, or that of their mixture, up to a factor. It is None if nothing shines, and for
+        different spectra in bands so narrow that the spectrum within them doesn't matter.
     maps : (group, band, band) float64
         Matrix from each group's transport to what it adds to the picture's bands; diagonal for lights of one spectrum.
     emitted : (group, band) float64
@@ -63,7 +64,7 @@ def band_light(
     ----------
     lights : mapping of str to LightGroup
     transport : (group,) float64
-        Radiance of each group at unit emission, in the mean over the picture: its share in the mixture.
+        Mean radiance of each group over the picture at unit emission, which weights the group in the mixture.
     wavelength_nm, width_nm : (band,) float64
     """
     emitted = emission(lights, wavelength_nm, width_nm)

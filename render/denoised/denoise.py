@@ -18,10 +18,10 @@ from rodcone.optional import optional_library
 from rodcone.types import Planes
 
 EXTRA = "denoise"
-SPECTRA = 6  # two calls of the denoiser, with three planes each
+SPECTRA = 6  # planes to which bands are summed: two calls of the denoiser, with three planes each
 LEAST_ALBEDO = 0.02  # smallest albedo that light is divided by; on darker surfaces the quotient would be mere noise
-SURFACE_POINTS = 64
-SURFACE_THREADS = 1 << 20
+SURFACE_POINTS = 64  # samples per pixel of the first surfaces
+SURFACE_THREADS = 1 << 20  # threads per launch
 MIXING_PIXELS = 2.0  # standard deviation of the window that averages squared errors
 # Singular values below this share of the largest one count as 0. They are squared, because the matrix is a product of
 # the light with its own transpose, and the light has single precision.
@@ -40,7 +40,7 @@ class Denoised:
     indirect : Halves of (group, band, h, w)
         The indirect part before it was denoised.
     folds : Halves of (group, band, h, w)
-        Two independent renders that measure the error of `radiance`; no part of them is in it.
+        Two independent renders that measure the error of `radiance`, which contains no part of them.
     fold_points : int
         Samples of each fold in a pixel of rate 1.
     """

@@ -75,9 +75,9 @@ def measured_error(
     Parameters
     ----------
     one, other : (..., h, w) array
-        The picture less each of the two, in a measure that is linear in light.
+        The picture minus each of the two others, in a measure that is linear in light.
     weight : (..., h, w) array
-        Of each pixel's squared error, 0 where it doesn't count; the mean is over all pixels.
+        Weight of each pixel's squared error, 0 for pixels that don't count; the mean is over all pixels.
 
     Returns
     -------

@@ -6,20 +6,20 @@ from numpy.typing import NDArray
 
 from rodcone.types import Floats, Planes
 
-LEAST_SHARE = 4  # every pixel gets at least one sample in four of the mean number
-MOST_RATE = 64
+LEAST_SHARE = 4  # largest mean of the rates, so that a pixel of rate 1 gets at least a quarter of the mean samples
+MOST_RATE = 64  # largest rate
 POOL = 5  # side of the window [pixels] over which the pilot's noise is pooled
 UNSEEN = 0.3  # share of the mean weight that every pixel gets, for the noise of rare paths that the pilot missed
 FLOOR = 0.01  # share of the mean light that is added everywhere, for a sensor's dark noise
-STEPS = 8  # from one power of two to the next, in the search for the rates' common factor
+STEPS = 8  # steps from one power of two to the next in the search for the rates' common factor
 
 
 def rates_of(scattered: Planes, seen: Planes) -> NDArray[np.uint32]:
     """Choose the pixels' rates, which are powers of two from 1 on, shape (h, w).
 
-    A pixel's weight is Monte Carlo variance over mean, of the light group where that is largest. At every level and for
-    every sensor it is proportional to the variance relative to that of shot noise. If samples are proportional to the
-    weight's square root, the mean of that ratio over the picture is least.
+    A pixel's weight is Monte Carlo variance over mean, of the light group for which this ratio is largest. At every
+    level and for every sensor it is proportional to the variance relative to that of shot noise. If samples are
+    proportional to the weight's square root, the mean of that ratio over the picture is least.
 
     Parameters
     ----------

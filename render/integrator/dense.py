@@ -46,13 +46,13 @@ CHOSEN = "chosen"  # the channel that counts such paths
 class Tracer:
     """Tracer of one light group's paths. A path's wavelengths are a list of `Spectrum`, four bands per entry.
 
-    It is no dataclass, because Dr.Jit takes a dataclass's arrays for variables of a loop.
+    It is no dataclass, because Dr.Jit would treat a dataclass's arrays as variables of a loop.
 
     Parameters
     ----------
     mi : module
     loaded : LoadedScene
-        What is rendered. If it is `coloured`, emission is evaluated at all wavelengths, otherwise once. If it has
+        Scene to render. If it is `coloured`, emission is evaluated at all wavelengths, otherwise once. If it has
         `sample_lights`, directions towards lights are sampled. A second group is a constant environment, which isn't
         in the scene: paths that escape bring its light.
     film : Film
@@ -88,8 +88,8 @@ class Tracer:
             ``scattered``: bands of light that isn't seen directly, first of the group, then of the environment.
             ``indirect``: if `split`, as many bands of indirect light. ``shares``: share of paths that meet a lamp
             first, which is also the lamp's radiance at unit emission, and share that meet the environment first.
-            ``lamps``: for coloured light, bands of the lamp that is met first. ``chosen``: share of paths whose BSDF
-            chose by wavelength.
+            ``lamps``: for coloured light, bands of the lamp that is met first. ``chosen``: share of paths on which a
+            BSDF's sample depended on wavelength.
         """
         wavelengths, step = self._wavelengths(points)
         ray = self._camera_ray(pixel, points)
@@ -105,7 +105,7 @@ class Tracer:
         }
 
     def meter(self, _: UInt, points: Points) -> Channels:
-        """Trace paths from the scene's irradiance meter: ``scattered``, as of `camera`, is irradiance over pi.
+        """Trace paths from the scene's irradiance meter; ``scattered`` of `camera` is irradiance over pi here.
 
         Each path starts at a random place on the meter's shape, whatever its pixel.
         """
@@ -121,8 +121,8 @@ class Tracer:
         Returns
         -------
         dict of lists of Float
-            ``albedo``: bands of the surface's albedo, times what glass and mirrors before it leave; ``normal``;
-            ``chosen`` as of `camera`.
+            ``albedo``: bands of the surface's albedo, times the share of light that glass and mirrors in front of it
+            leave; ``normal``; ``chosen`` as in `camera`.
         """
         mi = self.mi
         wavelengths, step = self._wavelengths(points)
@@ -293,7 +293,7 @@ class Tracer:
     def _mis_weight(
         self, scene: MitsubaScene, si: Interaction, previous: Interaction, previous_pdf: Float, previous_delta: Mask
     ) -> Float:
-        """Weigh light that a path meets by chance against sampling that light from the point before."""
+        """Compute the weight of light that a path meets, because the previous point may have sampled this light too."""
         if not self.sample_lights:
             return self.mi.Float(1.0)
         direction = self.mi.DirectionSample3f(scene, si, previous)

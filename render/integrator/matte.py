@@ -2,9 +2,9 @@
 
 Most of a band's cost is looking up reflectance. Mitsuba's ``twosided`` evaluates front and back, and each of them looks
 reflectance up twice, for the light's direction and for the sampled one: eight look-ups per wavelength, where two would
-do. If all surfaces stand in one table, none is needed. The table holds each band at `STEPS` offsets from its centre. A
-path draws one of these offsets and reads a row of all bands at once. Coloured emission may hold lines, which so few
-wavelengths would miss or hit for all paths alike; with it there is no table.
+do. If one table holds the reflectances of all surfaces, none is needed. The table holds each band at `STEPS` offsets
+from its centre. A path draws one of these offsets and reads a row of all bands at once. Coloured emission may contain
+lines, which so few wavelengths would miss or hit for all paths alike; with such emission there is no table.
 """
 
 from collections.abc import Callable
@@ -54,7 +54,7 @@ def reflectance_table(curves: tuple[Spectrum, ...], wavelength_nm: Floats) -> ND
 
 
 class TableReader:
-    """The table in the device's memory; no dataclass, whose arrays Dr.Jit would take for variables of a loop."""
+    """The table in the device's memory. It is no dataclass, whose arrays Dr.Jit would treat as variables of a loop."""
 
     def __init__(self, mi: ModuleType, table: NDArray[np.float32]) -> None:
         self._spectrum = mi.Spectrum
@@ -75,9 +75,9 @@ Table: TypeAlias = TableReader | None  # None if no surface of the scene is in a
 def matte_surface(mi: ModuleType) -> type[Bsdf]:
     """Build the BSDF class for the variant that is set; register it as ``matte``.
 
-    Properties of the plug-in: ``reflectance`` (a texture), ``twosided``; where its reflectance stands in the table also
-    ``row``, and for a checkerboard ``other_row`` and ``which``, a texture that is 1 where the other row holds. A
-    blend of two holds the second reflectance as ``other``, and the texture of its share as ``weight``.
+    Properties of the plug-in are ``reflectance`` (a texture) and ``twosided``. If the reflectance is in the table,
+    ``row`` is its row. A checkerboard also has ``other_row`` and ``which``, a texture that is 1 where the other row
+    applies. A blend of two has the second reflectance as ``other``, and the texture of its share as ``weight``.
     """
 
     class Matte(mi.BSDF):  # type: ignore[name-defined, misc]

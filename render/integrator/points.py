@@ -19,9 +19,9 @@ from render.integrator.variant_types import Float, Point2, UInt
 from rodcone.jit import dr
 
 DIRECTIONS = Path(__file__).parent.parent / "data" / "sobol_directions.json"
-LOG2_POINTS = 15
-DIMENSIONS = 34  # of the sequence; paths that need more get independent numbers
-# What the dimensions are for: the film or the meter's plate, then the bounces, then the rest.
+LOG2_POINTS = 15  # base-2 logarithm of the number of the sequence's points
+DIMENSIONS = 34  # dimensions of the sequence; paths that need more get independent random numbers
+# First dimension of each use: the film (or the meter's plate), the first bounce, further bounces, and so on.
 FILM, FIRST_BOUNCE, FURTHER_BOUNCES, WAVELENGTH, FIRST_LOBE, APERTURE = 0, 2, 6, 30, 31, 32
 A_BOUNCE = 6  # dimensions per bounce: 2 for the light, 2 for the direction, 1 for the lobe, and 1 unused to be even
 EVEN_BOUNCES = 5  # bounces whose dimensions lie within the sequence
@@ -61,7 +61,7 @@ def _on_device(mi: ModuleType) -> UInt:
 class Points:
     """Points of a wavefront, one per thread.
 
-    It is no dataclass, because Dr.Jit takes a dataclass's arrays for variables of a loop.
+    It is no dataclass, because Dr.Jit would treat a dataclass's arrays as variables of a loop.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Names for the types of Mitsuba's variant and of Dr.Jit's kernels, which hold one value per thread.
 
 Their classes depend on the variant, which is set while the program runs. To a type checker each is therefore `Any`; the
-names tell a reader which class is meant. `mi` is Mitsuba's module with that variant.
+names show a reader which class is meant. `mi` is Mitsuba's module with that variant.
 """
 
 from typing import Any, TypeAlias
@@ -11,7 +11,7 @@ from rodcone.jit import Float, Mask, UInt
 SPECTRUM_SIZE = 4  # wavelengths of a spectral variant's `Spectrum`
 
 Spectrum4: TypeAlias = Any  # `Spectrum`: four wavelengths of a path
-Spectra: TypeAlias = list[Spectrum4]  # all bands of a path, four an entry
+Spectra: TypeAlias = list[Spectrum4]  # all bands of a path, four per entry
 Point2: TypeAlias = Any
 Vector: TypeAlias = Any
 Ray: TypeAlias = Any
@@ -26,7 +26,7 @@ MitsubaScene: TypeAlias = Any
 
 # Start of a path: ray, surface that it leaves, density of its direction, whether no light was sampled, light so far.
 Start: TypeAlias = tuple[Ray, Interaction, Float, Mask, Spectra]
-Channels: TypeAlias = dict[str, list[Float]]  # of a tracer, by name: one number a channel
+Channels: TypeAlias = dict[str, list[Float]]  # results of a tracer by name: one number per channel and thread
 
 __all__ = [
     "SPECTRUM_SIZE",

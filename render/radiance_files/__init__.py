@@ -1,1 +1,1 @@
-"""Spectral radiance as files: OpenEXR and ISETCam's ``.mat``."""
+"""Files of spectral radiance or reflectance: OpenEXR, ISETCam's scenes, cubes and photographs."""

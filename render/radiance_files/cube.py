@@ -33,7 +33,7 @@ class StoredArray:
         Names of the array's axes.
     wavelength_nm : (band,) float64 or None
     law : (gains, offsets) or None
-        Linear law of each band from stored numbers to values.
+        Gain and offset of each band, which convert stored numbers to values.
     good : (band,) bool or None
         Whether a band is usable.
     """
@@ -173,7 +173,7 @@ def _read_npy(path: Path, described: Description) -> StoredArray:
 
 
 def _open_envi(header: Path, described: Description) -> StoredArray:
-    """Open ENVI's picture, with the linear law from stored numbers to the radiance or reflectance they stand for."""
+    """Open ENVI's picture, with the gains and offsets that convert stored numbers to radiance or reflectance."""
     picture = open_envi(header)
     law = picture.radiance
     if described.holds == REFLECTANCE:

@@ -51,7 +51,7 @@ class EnviPicture:
     good : (band,) bool
         Whether a band isn't marked as bad.
     ignored : float or None
-        Value that stands for no data.
+        Value that marks missing data.
     """
 
     values: NDArray[Any]

@@ -40,7 +40,7 @@ VERSION = "1.0"
 LAYOUT_UNITS = "W.m^-2.sr^-1"  # what the layout prescribes, though its values are spectral: per nm
 TRUE_UNITS = "W.m^-2.sr^-1.nm^-1"
 UNITS, OWN_UNITS, BANDS = "emissiveUnits", "rodconeUnits", "rodconeBands_nm"
-LAMP = "rodconeLamp"  # nm:value, up to a factor; linear between, 0 outside
+LAMP = "rodconeLamp"  # points nm:value of the lamp's spectrum, up to a factor; linear between them, 0 outside
 _MEASUREMENT = ("lensTransmission", "cameraResponse")  # curves of the camera that took the picture; they aren't undone
 _SPECTRAL = re.compile(r"(S[0-3]|T)\.([0-9]*,?[0-9]*(?:[Ee][+-]?[0-9]+)?)(\w{,2}(?:m|Hz)(?:\..*)?)")
 

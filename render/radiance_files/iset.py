@@ -40,8 +40,8 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
 
     Three forms are tried in this order: a saved ``scene`` struct; ``mcCOEF`` and ``basis``, with ``imgMean`` if the
     mean was subtracted; ``photons`` (or ``data``) with ``wave`` (or ``wavelength``). Negative photons become 0, as in
-    ISETCam, with a `UserWarning`; of photons that the file stores at most 1 % may be negative. A sample of wavelength
-    stands for a band as wide as the spacing.
+    ISETCam, with a `UserWarning`; of photons that the file stores at most 1 % may be negative. Each sample of
+    wavelength becomes a band as wide as the spacing.
 
     Parameters
     ----------

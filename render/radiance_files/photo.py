@@ -35,7 +35,7 @@ def photo_size(path: str | Path) -> tuple[int, int]:
 
 
 def read_photo(path: str | Path, spectra: str = SURFACES) -> SpectralRadiance:
-    """Read a photograph, whose colours are taken as sRGB, as reflectances: the values of a `SpectralRadiance`.
+    """Read a photograph as reflectances, the values of a `SpectralRadiance`; its colours are assumed to be sRGB.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class PhotoPlanes:
 
 
 def warn_of_reach(of_basis: NDArray[np.floating], linear: Singles) -> None:
-    """Warn if one pixel in a hundred or more takes a share (h, w) of sRGB's basis and isn't nearly white."""
+    """Warn if one pixel in a hundred or more isn't nearly white and has a share of sRGB's basis, `of_basis` (h, w)."""
     beyond = (of_basis > 0) & (linear.min(axis=-1) < NEARLY_WHITE)
     if beyond.mean() >= LEAST_TOLD:
         warnings.warn(

@@ -7,8 +7,8 @@ the cluster's mean luminance Y_m and then scaled, so that shade changes no spect
 
     r(XYZ) = (Y / Y_m) r_0 + B M^-1 XYZ,   r_0 = m - B M^-1 XYZ_m,
 
-with M the colours of B: one matrix for each cluster. Where r leaves 0 to 1, it is mixed with the reflectance of sRGB's
-basis, which never does. The mixture has the same colour, and takes the least share of the basis that keeps it within 0
+where M holds the colours of B, one matrix for each cluster. Where r leaves 0 to 1, it is mixed with the reflectance of
+sRGB's basis, which never does. The mixture has the same colour, and the least share of the basis that keeps it within 0
 to 1. From 730 nm on, where the data end, curves keep their last value.
 """
 
@@ -139,12 +139,12 @@ def _by_cluster(colours: Spectra) -> Iterator[tuple[int, NDArray[np.intp], Spect
 
 
 def _mixed(curves: Spectra, amounts: Spectra) -> Spectra:
-    """Mix curves (band, 3) in amounts (3, colour), shape (band, colour); BLAS takes three times as long for three."""
+    """Mix curves (band, 3) in amounts (3, colour), shape (band, colour); BLAS would take three times as long."""
     return np.asarray(curves[:, :1] * amounts[0] + curves[:, 1:2] * amounts[1] + curves[:, 2:] * amounts[2])
 
 
 def _brought_back(outside: Spectra, inside: Spectra) -> tuple[Spectra, Spectra]:
-    """Mix spectra (band, colour) that leave 0 to 1 with the least share of spectra that don't; also return that."""
+    """Mix spectra (band, colour) that leave 0 to 1 with the least share of spectra that stay within, and return that share."""
     limit = np.clip(outside, 0, 1)
     needed = np.divide(limit - outside, inside - outside, out=np.zeros_like(outside), where=limit != outside)
     taken = np.clip(needed.max(axis=0), 0, 1)
@@ -171,8 +171,8 @@ def _selector() -> tuple[list[tuple[float, int]], NDArray[np.intp]]:
     """Return the lines that separate the clusters, (value, axis), and a table of clusters by the lines below a colour.
 
     Axis 0 is x and axis 1 is y. Bit i of a table's index says whether a colour lies above line i. The data are a tree
-    with a row per line: value, axis, and what follows for colours at or below it and above it. What follows is a
-    cluster, or, if negative, the next line's row.
+    with a row per line: value, axis, a number for colours at or below the line, and a number for colours above it. Such
+    a number is a cluster or, if it is negative, minus the row of the next line.
     """
     tree = quietly_imported("colour.recovery").SELECTOR_ARRAY_OTSU2018
     cluster = np.empty(1 << len(tree), dtype=np.intp)

@@ -35,6 +35,7 @@ def require_allowed(plugin: str, *, tag: str, name: str, trust: bool) -> None:
     tag, name : str
         Type of the scene's element, and its name, which may be empty.
     trust : bool
+        Whether the scene may name plug-ins that aren't on the list.
     """
     what = f"{tag} {name!r} of type" if name else f"{tag} type"
     if plugin in _REASONS:
@@ -46,7 +47,7 @@ def require_allowed(plugin: str, *, tag: str, name: str, trust: bool) -> None:
 
 
 def kind_of(mi: ModuleType, plugin: str) -> str:
-    """Return the kind of an allowed plug-in. Only for one that isn't listed, Mitsuba is asked, which loads it.
+    """Return the kind of an allowed plug-in; if it isn't listed, Mitsuba loads it to find the kind.
 
     Raises
     ------

@@ -98,9 +98,9 @@ def _with_held_ends(opened: SceneFile) -> SceneFile:
 
 
 def _parse(mi: ModuleType, file: Path, trust: bool, define: Mapping[str, str]) -> Any:
-    """Parse a file; return the parser's state. The scene's folder is on Mitsuba's search path only meanwhile.
+    """Parse a file, which loads no plug-in, and return the parser's state.
 
-    Parsing loads no plug-in.
+    The scene's folder is on Mitsuba's search path only during this call, unless the scene is trusted.
     """
     resolver = search_path(mi)
     config = mi.parser.ParserConfig(mi.variant())

@@ -39,7 +39,7 @@ class SceneFile:
     size : (int, int)
         Height and width of the camera's film in pixels.
     notes : tuple of str
-        What was read but is left out, in words.
+        Sentences about parts of the file that are left out or replaced.
     """
 
     scene: Scene
