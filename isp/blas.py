@@ -15,5 +15,5 @@ def one_thread() -> AbstractContextManager[Any]:
 
 @cache
 def _blas() -> ThreadpoolController:
-    """Find the loaded BLAS; the search takes milliseconds, so that its result is kept."""
+    """Find the loaded BLAS; the search takes milliseconds, and its result is kept."""
     return ThreadpoolController().select(user_api="blas")

@@ -40,8 +40,8 @@ class Settings:
         0.001 to inf.
     distance : {"noise", "raw"}
         With "noise" one guide serves all channels, in units of noise (`isp.interleaved.panchromatic`). With "raw", as
-        in the paper, distances are in electrons between planes of W, or by eq. (6) of the channel itself, with alpha
-        counted over the patch.
+        in the paper, distances are in electrons, between patches of W's plane and, in the share alpha of eq. (6), of
+        the channel's own plane; alpha is counted over the patch.
 
     Raises
     ------

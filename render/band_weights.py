@@ -2,7 +2,7 @@
 
 Light within a band is a transport T (what surfaces and paths make of a lamp) times the lamp's own spectrum S. T is
 smooth, and S is known to the last line. The integral of a curve Q over the light is therefore the integral of S Q T, in
-which T is interpolated from its band means. For the interpolation, T is taken as a Gaussian process over wavelength:
+which T is interpolated from its band means. For the interpolation, T is treated as a Gaussian process of wavelength:
 its covariance gives the weights of least expected squared error, and that error (Rasmussen & Williams, "Gaussian
 Processes for Machine Learning", 2.25; integrals as O'Hagan 1991, "Bayes-Hermite quadrature"). Weights are at least 0.
 If the best ones would raise a render's noise by more than 5 %, the weights of least error within that limit are used.
@@ -22,7 +22,7 @@ from rodcone.types import Floats
 Curves = Callable[[Floats], Floats]  # wavelengths (n,) [nm] to values (curve, n)
 
 # Covariance of T: Matern's of order 5/2, variance 1, on a mean that may be anything. With this length the expected
-# error of chart patches is 0.7 to 2.4 times what it is (benchmarks/bands.py), and the weights hardly depend on it.
+# error of chart patches is 0.7 to 2.4 times the true one (benchmarks/bands.py), and the weights hardly depend on it.
 LENGTH_NM = 100.0
 _MEAN_VARIANCE = 100.0  # assumed variance of T's mean; it keeps the weights' sum while negative ones are removed
 _ROUNDING = 1e-9  # variance of a band mean's own error, without which the covariance of bands of 1 nm is singular
@@ -153,7 +153,7 @@ def band_weights(
     light : Spectrum, optional
         The lamp, up to a factor. None means that it isn't known; the light itself is then assumed to be smooth.
     most_noise : float
-        Largest noise of the weights, over the noise of plain products of averages. Each band is taken to have an
+        Largest noise of the weights, over the noise of plain products of averages. Each band is assumed to have an
         independent relative error of the same size.
 
     Returns

@@ -148,7 +148,7 @@ def read_arrays(path: Path) -> dict[str, Any] | None:
 
 
 def write_arrays(path: Path, arrays: Mapping[str, Any], *, packed: bool = False) -> None:
-    """Write arrays behind their digest, compressed where asked for; readers see the whole file or none."""
+    """Write arrays after their digest, compressed if `packed`; readers see the whole file or none."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as (place,), place.open("w+b") as file:
         file.write(bytes(_DIGEST_BYTES))

@@ -29,7 +29,7 @@ class SpectralRadiance:
     relative_mc_error : float
         Median over pixels and bands of the Monte Carlo standard error over the mean; 0 if nothing was rendered.
     width_nm : (band,) float64
-        Band widths; left out, the spacing of evenly spaced centres.
+        Band widths, by default the spacing of evenly spaced centres.
     relative_level_error : float, optional
         Monte Carlo standard error of the level to which the light was scaled, over that level; None if no level was
         asked for or there is no estimate.

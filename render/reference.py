@@ -271,7 +271,7 @@ def agreement(live: Transport, reference: Transport) -> Agreement:
 
 
 def require_agreement(live: Transport, reference: Reference) -> str:
-    """Say in a sentence how well a render made on this machine agrees with a reference.
+    """Return a sentence that says how well a render of this machine agrees with a reference.
 
     Raises
     ------

@@ -72,7 +72,7 @@ class Means:
 
 @dataclass(frozen=True)
 class Half:
-    """One half of the paths of a loaded scene.
+    """One half of a loaded scene's paths.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Half:
 
 @dataclass(frozen=True)
 class Drawn:
-    """Means that one half of the paths of a loaded scene gives in some chunks, at the pixels of a launch.
+    """Means over one half of a loaded scene's paths in some chunks, at the pixels of a launch.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Drawn:
         For each group, as `Means.seen`.
     coverage : (chunk, pixel) float32
     indirect : (chunk, group, band, pixel) float32
-        It has no groups unless it was asked for.
+        Indirect part of `radiance`; without any group unless `Half.split`.
     """
 
     radiance: Planes
@@ -231,7 +231,7 @@ def add_run(
     start = means.count
     chunk = chunk_from(means.count)
     split = means.indirect is not None
-    # A launch takes as many chunks as its threads hold, but only of one length (chunks grow along the sequence).
+    # A launch has as many chunks as fit its threads, but only of one length (chunks grow along the sequence).
     threads = launch_threads(scenes, film, split=split)
     fitting = max(1, threads // (int(means.rates.sum()) * chunk))
     equal_chunks = next(n for n in range(1, MOST_POINTS) if n == fitting or chunk_from(start + n * chunk) != chunk)
@@ -262,7 +262,7 @@ def _weights(span: Span) -> list[np.float32]:
 
 
 def _add(loaded: LoadedScene, means: Means, halves: tuple[Drawn, Drawn], pixels: NDArray[np.intp], span: Span) -> None:
-    """Add the light of a loaded scene in the chunks of a launch, at its pixels."""
+    """Add the light of a loaded scene to the means, chunk by chunk, at the pixels of a launch."""
     even, odd = halves
     at = where(pixels)
     for (index, weight), (slot, group) in product(enumerate(_weights(span)), enumerate(loaded.groups)):
@@ -285,7 +285,7 @@ def pilot_rates(scenes: list[LoadedScene], film: Film, lights: Floats, seed: int
     scattered = np.zeros((len(lights), 2 * PILOT.chunks, *film.size), np.float32)
     seen = np.zeros((len(lights), *film.size), np.float32)
     threads = launch_threads(scenes, film)
-    # If a picture takes several launches, memory holds one chunk of it at a time.
+    # If a picture needs several launches, memory holds one chunk of it at a time.
     at_once = PILOT.chunks if uniform.size * PILOT.chunk * PILOT.chunks <= threads else 1
     spans = [Span(first * PILOT.chunk, PILOT.chunk, at_once) for first in range(0, PILOT.chunks, at_once)]
     for loaded in scenes:
@@ -304,7 +304,7 @@ def pilot_rates(scenes: list[LoadedScene], film: Film, lights: Floats, seed: int
 
 
 def launch_threads(scenes: list[LoadedScene], film: Film, *, split: bool = False) -> int:
-    """Return how many threads a launch has, as their channels' memory allows."""
+    """Return the number of threads per launch, which the memory of their channels limits."""
     return MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size, split=split) for loaded in scenes)
 
 

@@ -247,7 +247,7 @@ class Transport:
         For a file of radiance whose lamp was named (`render.bands.known_lamp`), the error of the file's own bands isn't
         included. For chart patches in bands of 20 nm that error is 0.03 % RMS, and 0.06 % under high-pressure sodium.
 
-        If the lamp isn't known, the light is taken to be as smooth within bands as between them. Under a lamp with
+        If the lamp isn't known, the light is assumed to be as smooth within bands as between them. Under a lamp with
         lines the true error is then larger than this estimate: for chart patches in bands of 20 nm up to 3.0 % under
         F2, 4.4 % under high-pressure sodium and 5.6 % under F11 (`benchmarks/bands.py`).
 
@@ -276,8 +276,8 @@ class Transport:
     def level(self, spectra: Spectra | None = None, *, powers: Powers | None = None) -> Level:
         """Compute the mean luminance [cd m^-2] that a level in cd/m^2 sets, under given lights.
 
-        Directly visible light is left out of the sum of light, and the part of the picture that it covers out of the
-        area.
+        Directly visible light is left out of the sum of light, and the part of the picture that it covers is left out
+        of the area.
 
         Raises
         ------

@@ -41,7 +41,7 @@ _SEPARATORS = ("\t", ";", None, ",")  # None: white space
 _METER = re.compile(r"(?:spectral data\s*)?([\d.,]+)\s*[\[(]?nm[\])]?", re.IGNORECASE)  # 380nm, Spectral Data 380[nm]
 _BINARY = {b"PK\x03\x04": "Excel's .xlsx", b"\xd0\xcf\x11\xe0": "Excel's binary .xls", b"%PDF": "a PDF"}
 
-# IES TM-27-14: what a file's values may be, by what is asked for, and the elements that leave values as they are.
+# IES TM-27-14: quantities that are allowed for each use of a file, and the elements that don't change values.
 _QUANTITIES = {
     "illuminant": ("flux", "intensity", "irradiance", "radiance", "exitance", "relative"),
     "chart": ("reflectance", "R-Factor"),

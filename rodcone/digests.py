@@ -56,7 +56,7 @@ def _plain(value: object) -> Any:
 
 def rounded(value: object) -> Any:
     """Return plain data with its floats rounded as `digest_inputs` hashes them."""
-    if isinstance(value, str) and "," in value:  # a spectrum as Mitsuba takes it is text: 0.25,0.5,...
+    if isinstance(value, str) and "," in value:  # in a scene a spectrum is text: 0.25,0.5,...
         with suppress(ValueError):
             return rounded(np.array(value.split(","), dtype=np.float64))
     if value is None or isinstance(value, str | int):

@@ -17,7 +17,7 @@ def optional_library(name: str, extra: str) -> Any:
     Raises
     ------
     InputError
-        Where it is not installed; the line names the extra that brings it.
+        If it isn't installed; the message names the extra that installs it.
     """
     try:
         return quietly_imported(name)

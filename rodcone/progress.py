@@ -12,7 +12,7 @@ from typing import Any, TextIO, TypeAlias
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, Task, TimeElapsedColumn
 
-Step: TypeAlias = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
+Step: TypeAlias = Callable[[str, float], None]  # function of a text, what is being done, and the share done (0..1)
 LINE_EVERY_S = 5.0  # time from line to line in a log
 SHOW_EVERY_S = 0.2  # least time between two updates in a notebook
 LEAST_COMPILE_S = 1.0  # shortest compilation that is reported
@@ -21,7 +21,7 @@ START = "start"  # text of a task before its first step
 
 @contextmanager
 def progress(file: TextIO) -> Iterator[Step]:
-    """Yield a function to call with what is being done and the share of the whole that is done (0..1).
+    """Yield a function that shows progress: it is called with what is being done, and the share done (0..1).
 
     On a terminal it moves a bar, which vanishes at the end. Elsewhere, as in the log of a batch system, a line is
     printed every five seconds if there is something new. The share only grows. Bar and line show the time left,

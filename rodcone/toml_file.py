@@ -38,8 +38,8 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        For what is no TOML in UTF-8, is over 256 KiB, nested deeper than Python's parser goes, has a key of over 32
-        parts, or holds a whole number of more than 64 bits.
+        For a file that is no TOML in UTF-8, is over 256 KiB, nested deeper than Python's parser goes, has a key of over
+        32 parts, or holds a whole number of more than 64 bits.
     OSError
         Where there is no file, or it can't be read.
     """

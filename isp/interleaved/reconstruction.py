@@ -54,7 +54,7 @@ def reconstruct(raw: RawImage, settings: Settings = DEFAULTS, neutral: Floats | 
     Notes
     -----
     Other frame sizes, sigmas and neighbourhoods use the kernels that are already compiled; another patch or tile size
-    compiles new ones. Besides the result a call takes 32 bytes per pixel and some 0.6 GB.
+    compiles new ones. Besides the result a call needs 32 bytes per pixel and some 0.6 GB.
     """
     return reconstruct_with_noise(raw, settings, neutral).estimate.astype(np.float32, copy=False)
 

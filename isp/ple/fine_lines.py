@@ -29,7 +29,7 @@ EVEN, EVEN_PX = 0.3, 5.0  # standard deviation and length of a
 CONTRAST, CONTRAST_PX = 0.6, 2.5  # the same of b; so short that lines not quite two pixels apart are included
 GREY = 0.015  # standard deviation of q_c; with a larger one, yellow or pale blue things become striped
 REST, REST_OF_CHANNEL = 1e-4, 1e-5  # further variance of each pixel: common to its channels, and of each channel alone
-LEAST_ALIASED = 0.05  # least stripes that the means of a patch's channels must show, as a share of them, to try lines
+LEAST_ALIASED = 0.05  # lines are tried if the means of a patch's channels show them with this relative contrast or more
 
 
 def signs(size: int) -> Floats:

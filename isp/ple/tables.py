@@ -2,7 +2,7 @@
 
 In units of noise (`isp.ple.units`) a sample of e expected electrons has the mean reading t(e) and noise of variance r.
 In a patch of light m and roots of signal u, a sample of channel c with gain g_c has e = m g_c u^2. Near a component's
-mean, t is taken as linear in u, so that each component is a Gaussian over t as well. Its estimate from the mosaic's
+mean, t is treated as linear in u, so that each component is a Gaussian over t as well. Its estimate from the mosaic's
 samples y is the linear one with the least squared error, t + C_xy (C_yy + N)^-1 (y - t_y), where N holds the noise r.
 """
 
@@ -21,13 +21,13 @@ from isp.ple.prior import PATCH, Mixture, Prior, mixture
 from isp.ple.units import readings
 from rodcone.types import Floats, Singles
 
-STEP = 1.25  # ratio of the light of one table to that of the table before
+STEP = 1.25  # ratio of light from one table to the next brighter one
 LIGHT_ERROR = 0.12  # relative standard deviation of a patch's light, the step's included
 PILOT_ERROR = 0.03  # further error of a coarser scale's means, beside their variance [share of the light]
 PILOT_VARIANCE = 0.02  # typical variance of a coarser scale's means [units of noise^2]
 BRIGHTNESS = 0.98  # share of that variance that lies in brightness; a coarser scale knows colour much better
 TAPER = 1.0  # power of the half sine by which a patch's pixels are weighted
-DIRECTIONS = 20  # directions over which the approximate likelihood is computed that selects candidates
+DIRECTIONS = 20  # number of directions for the approximate likelihood, which selects candidates
 # A candidate's approximate log likelihood lies at most so far below the largest: the first number if the remaining
 # directions hold only noise, the second if they hold only signal.
 MARGINS = (5.0, 15.0)
@@ -195,7 +195,7 @@ class Table:
         along = brightness / np.linalg.norm(brightness)
         error = PILOT_VARIANCE * (4 * BRIGHTNESS * np.outer(along, along) + (1 - BRIGHTNESS) * np.eye(4))
         white = np.linalg.inv(np.linalg.cholesky(error + np.diag((PILOT_ERROR * brightness) ** 2)))
-        self.white = white.astype(np.float32)  # scales the pilot's errors to variance 1 where `noise` is 1
+        self.white = white.astype(np.float32)  # scales the pilot's errors to variance 1, if `noise` of `pick` is 1
         # The pilot's covariances with the samples, and with itself.
         slopes = self.slopes.reshape(len(electrons), pixels, 4).swapaxes(1, 2) / pixels
         lean = (slopes.astype(np.float32)[:, :, None] @ among.by_channel)[:, :, 0] * self.slopes[:, None]
@@ -220,7 +220,7 @@ class Table:
         self._making = RLock()
 
     def _quick_likelihood(self) -> tuple[Singles, Singles, Singles, Floats]:
-        """Compute what gives the log likelihood of samples and pilot by their coordinates in `DIRECTIONS` directions.
+        """Compute a matrix for the log likelihood of samples and pilot by coordinates in `DIRECTIONS` directions.
 
         Let z be a patch's coordinates, and let m and C be their mean and covariance in a component of weight w. Let q
         be the sum of squares in the n other directions, which all count with their mean variance o. Twice the log
@@ -228,7 +228,7 @@ class Table:
 
             2 log w - (z - m)^T C^-1 (z - m) - log |C| - q / o - n log o.
 
-        The log likelihoods of all trained components are one matrix times the column of the products z_i z_j, z, q
+        The log likelihoods of all trained components are the matrix times the column of the products z_i z_j, z, q
         and 1. Each of its rows holds C^-1, C^-1 m, 1 / o and the constant of a component, with their factors.
 
         Returns

@@ -15,9 +15,9 @@ colour's light l_c. This half is therefore the prior standard deviation of its b
 share (l_c / 2)^2 / ((l_c / 2)^2 + s_c^2), because samples that know a region's light less well add only noise. The
 result is added as a share of the colour's light, so that dark places of a region get less.
 
-Where the 16 pixels on each side show too little, a wider region may show enough, for example if a whole picture is red.
-The same is therefore done three times, with cells of 16, then 8, then 4 pixels a side, each time with the residuals
-that are left.
+Such a mean reaches `REACH` cells, 16 pixels, to each side. If these show too little, a wider region may show enough,
+for example if a whole picture is red. The same is therefore done three times, with cells of 16, then 8, then 4 pixels a
+side, each time with the residuals that are left.
 
 A cell of 4x4 pixels in which the residuals of a channel differ from each other by more than noise holds a lamp or an
 edge, and no even surface. Its residuals count for no cell, and nothing is added to it.
@@ -201,7 +201,7 @@ def _bias(x: Singles, wide: list[Singles], light: Singles, guide: int, colours: 
 
 
 def _sums(values: NDArray[Any], side: int = CELL) -> Singles:
-    """Sum squares of `side` x `side` values; those at the bottom and the right edge may have fewer values."""
+    """Sum the values in each square of `side` x `side`; squares at the bottom and the right edge may be cut off."""
     height, width = values.shape[:2]
     filled = np.pad(values, ((0, -height % side), (0, -width % side), *((0, 0),) * (values.ndim - 2)))
     cells = filled.reshape(len(filled) // side, side, filled.shape[1] // side, side, *values.shape[2:])

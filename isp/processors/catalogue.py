@@ -39,8 +39,8 @@ class Processor:
     Attributes
     ----------
     mosaic : str
-        Name that `sensor.presets.vary` takes: one of `sensor.cfa.MOSAICS`, a variation with its own curves, or ``own``
-        for the sensor's own mosaic.
+        Name for `sensor.presets.vary`: one of `sensor.cfa.MOSAICS`, a variation with its own curves, or ``own`` for the
+        sensor's own mosaic.
     picture : callable
         Function ``picture(raw, colours, *, balance) -> Picture`` with a `ColourFit` and a `WhiteBalance`, which
         `develop` calls.

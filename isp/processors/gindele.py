@@ -10,7 +10,7 @@ This project adds white balance before, filling W from its quarter of the sites 
 for ties, and bilinear interpolation by normalised convolution as the second method.
 
 S. H. Park, H. S. Kim, S. Lansel, M. Parmar, B. A. Wandell, "A case for denoising before demosaicking color filter array
-data", Asilomar 2009, is about Bayer; `isp.processors.sub_images` takes any 2x2 tile. Here W's sub-image is the fourth,
+data", Asilomar 2009, is about Bayer; `isp.processors.sub_images` allows any 2x2 tile. Here W's sub-image is the fourth,
 and Adams' interpolation follows. Where W is full, its sub-image is flat, and the others keep their differences.
 """
 

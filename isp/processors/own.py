@@ -26,7 +26,7 @@ from rodcone.files import read_bounded
 from sensor.cfa import OWN
 from sensor.raw import RawImage
 
-MOST_BYTES = 1 << 20  # largest file that is read; a processor takes a few thousand bytes
+MOST_BYTES = 1 << 20  # largest file that is read; a processor has a few thousand bytes
 _NAME = re.compile(r"(.+\.(?:py|whl)):([A-Za-z_]\w*)")
 _RENAMED = {"bayer_fair": "bayer_bilinear", "kriging": "ple or any_mosaic"}  # other old names resemble their new ones
 

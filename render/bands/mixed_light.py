@@ -33,7 +33,7 @@ class BandLight:
         Spectrum that all lights share, or that of their mixture, up to a factor. It is None if nothing shines, and for
         different spectra in bands so narrow that the spectrum within them doesn't matter.
     maps : (group, band, band) float64
-        Matrix from each group's transport to what it adds to the picture's bands; diagonal for lights of one spectrum.
+        Matrix from each group's transport to its part of the picture's bands; diagonal for lights of one spectrum.
     emitted : (group, band) float64
         Band means of each group's emission.
     mixed : bool

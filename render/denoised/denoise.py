@@ -26,7 +26,7 @@ MIXING_PIXELS = 2.0  # standard deviation of the window that averages squared er
 # Singular values below this share of the largest one count as 0. They are squared, because the matrix is a product of
 # the light with its own transpose, and the light has single precision.
 ROUNDING = 1e-10
-_PLANES = 3  # planes that the denoiser takes in one call
+_PLANES = 3  # planes that the denoiser accepts in one call
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,7 @@ def tracers(loaded: LoadedScene, film: Film, most_bands: int, seed: int, *, spli
 def traced(
     trace: Callable[[UInt, Points], Channels], rates: NDArray[np.uint32], span: Span, threads: int, seed: int
 ) -> dict[str, Planes]:
-    """Trace paths and average what they give over each chunk of points: by name, each (chunk, channel, h, w).
+    """Trace paths and return the means of their channels over each chunk: by name, each (chunk, channel, h, w).
 
     Raises
     ------
@@ -60,12 +60,12 @@ def traced(
 def on_whole_film(
     draw: Callable[[NDArray[np.intp]], Mapping[K, Planes]], rates: NDArray[np.uint32], span: Span, threads: int
 ) -> dict[K, Planes]:
-    """Draw all launches and join what they give into planes of the whole film, each (..., pixel) float32.
+    """Draw all launches and join their results to planes of the whole film, each (..., pixel) float32.
 
     Parameters
     ----------
     draw : callable
-        Takes the pixels of a launch, and gives planes (..., pixel of the launch) by their names or numbers.
+        Function of the pixels of a launch that returns planes (..., pixel of the launch) by their names or numbers.
     rates, span, threads
         As in `launches`.
     """

@@ -24,7 +24,7 @@ AXES = ("height", "width", "wavelength")
 
 @dataclass(frozen=True)
 class StoredArray:
-    """Numbers of a file as it stores them, and what it states about them.
+    """Numbers as a file stores them, and facts that the file states about them.
 
     Attributes
     ----------

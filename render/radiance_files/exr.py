@@ -201,7 +201,7 @@ def write_exr(radiance: SpectralRadiance, path: str | Path, *, scene: str = "") 
     if len(set(names)) < len(names):
         raise InputError(f"{path}: band centres less than 1e-6 nm apart have no names of their own; merge those bands")
     preview, white_cd_m2 = _preview(radiance)
-    lamp = radiance.light  # a constant spectrum isn't written: coloured light has it too, and it tells nothing
+    lamp = radiance.light  # a constant spectrum isn't written, because coloured light has it too, and it has no lines
     channels = {name: np.ascontiguousarray(radiance.values[:, :, k], np.float32) for k, name in enumerate(names)}
     channels |= {name: np.ascontiguousarray(preview[:, :, k]) for k, name in enumerate("RGB")}
     header = {

@@ -11,7 +11,7 @@ from render.spectrum import band_widths
 from rodcone.errors import InputError
 from rodcone.types import Floats
 
-MOST_SIDE = 1 << 15  # pixels of a side, as in a render
+MOST_SIDE = 1 << 15  # largest side [pixels], as in a render
 MOST_BYTES = 1 << 33  # 8 GiB of float32 pixels, such as 4 Mpx with 500 bands; their render needs three times that
 MOST_CHANNELS = 4096  # ten times the bands of 1 nm over the visible; OpenEXR's time grows with the number's square
 # A black picture shrinks to 1/957 in ZIP, 1/405 in PIZ and 1/1264 in PXR24. A file that claims more doesn't hold it.

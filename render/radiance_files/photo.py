@@ -1,6 +1,6 @@
 """Photographs as scenes: each pixel's colour is converted to a spectral reflectance.
 
-A photograph doesn't tell the true spectra. Each colour gets one of the many spectra that look like it under D65: one
+A photograph doesn't show the true spectra. Each colour gets one of the many spectra that look like it under D65: one
 like those of measured surfaces, or a mixture of sRGB's three basis curves (`render.radiance_files.surface_spectra`).
 """
 
@@ -21,7 +21,7 @@ from rodcone.errors import InputError, read_errors, require_name
 from rodcone.types import Floats, Planes, Singles
 
 EXTENSIONS = (".jpg", ".jpeg", ".png")
-MOST_SIDE = 4096  # pixels of a side, checked before memory is allocated
+MOST_SIDE = 4096  # largest side [pixels], checked before memory is allocated
 SURFACES, SRGB_BASIS = SPECTRA = ("surfaces", "srgb_basis")
 NEARLY_WHITE = 0.9  # above this linear value a colour isn't reported, because white has only one spectrum anyway
 TOGETHER = 64  # rows of a photograph that are decoded at once

@@ -47,7 +47,7 @@ def is_reference(path: str | Path) -> bool:
 
 
 def is_iset(path: str | Path) -> bool:
-    """Return whether a file is taken as an ISETCam scene: a ``.mat`` without a description beside it."""
+    """Return whether a file is read as an ISETCam scene: a ``.mat`` without a description beside it."""
     return Path(path).suffix.lower() == ".mat" and not description(path).is_file()
 
 
@@ -76,7 +76,10 @@ def files_of(path: str | Path) -> list[Path]:
 
 
 def extent_of(path: str | Path) -> tuple[int, int, int]:
-    """Estimate a picture file's pixels, bands and light groups: a photograph by its header, others by their bytes."""
+    """Estimate the numbers of a picture file's pixels, bands and light groups.
+
+    They are exact for photographs (by the header) and reference light, and estimated from the size of other files.
+    """
     if Path(path).suffix.lower() in photo.EXTENSIONS:
         height, width = photo.photo_size(path)
         return height * width, DEFAULT_WAVELENGTH_NM.size, 1
@@ -137,7 +140,7 @@ def load_picture(path: str | Path, light: Spectrum, spectra: str = photo.SURFACE
     Warns
     -----
     OtherLampWarning
-        If the file holds light in bands that the lamp leaves dark. The light is then taken as smooth.
+        If the file holds light in bands that the lamp leaves dark. The light is then assumed to be smooth.
     """
     if is_reference(path):
         return open_reference(path).transport
@@ -181,7 +184,7 @@ def as_transport(radiance: SpectralRadiance, name: str = "scene") -> Transport:
     """Make a transport with one light group, which at a spectrum of 1 gives the radiance unchanged.
 
     It has no reference plane, and no light counts as directly visible. The variance follows from the radiance's
-    relative Monte Carlo error, which is taken as the same in every pixel. The halves' difference is 0, because one
+    relative Monte Carlo error, which is assumed to be the same in every pixel. The halves' difference is 0, because one
     picture holds no halves.
 
     Parameters

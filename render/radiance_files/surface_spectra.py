@@ -144,7 +144,7 @@ def _mixed(curves: Spectra, amounts: Spectra) -> Spectra:
 
 
 def _brought_back(outside: Spectra, inside: Spectra) -> tuple[Spectra, Spectra]:
-    """Mix spectra (band, colour) that leave 0 to 1 with the least share of spectra that stay within, and return that share."""
+    """Mix spectra (band, colour) that leave 0 to 1 with the least share of spectra that stay within; also return it."""
     limit = np.clip(outside, 0, 1)
     needed = np.divide(limit - outside, inside - outside, out=np.zeros_like(outside), where=limit != outside)
     taken = np.clip(needed.max(axis=0), 0, 1)

@@ -123,7 +123,7 @@ def _exp2(exponent: Float) -> Float:
     """Compute 2^exponent for -125 <= exponent < 127 within 8e-5.
 
     The bits of a float are nearly its logarithm: 2^n (1 + m) is stored as (n + 127 + m) 2^23. Therefore n + 2^f - 1 is
-    computed for 0 <= f < 1, scaled, and its value taken as bits (Schraudolph 1999, with a cubic for his straight line).
+    computed for 0 <= f < 1, scaled, and used as the float's bits (Schraudolph 1999, with a cubic instead of a line).
     """
     real = type(exponent)
     whole = dr.floor(exponent)

@@ -2,9 +2,9 @@
 
 Here x is a pixel to reconstruct, and y = x + d the pixel of a sample. With a shared guide, a thread owns all x of its
 block and reads one plane. Otherwise it owns those whose y lie at one cell of the tile, and reads the plane of the
-channel there. Therefore one compiled kernel serves all phases and
-cells, and all mosaics with a tile of this size. Most of the time is spent on loading, so that at y whole rows are
-loaded, each as a packet (`isp.interleaved.kernel.layout`).
+channel there. Therefore one compiled kernel serves all phases and cells, and all mosaics with a tile of this size. Most
+of the time is spent on loading, so that at y whole rows are loaded, each as a packet
+(`isp.interleaved.kernel.layout`).
 """
 
 from dataclasses import dataclass
