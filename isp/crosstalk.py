@@ -25,7 +25,7 @@ from sensor.raw import RawImage, full_at_sites
 
 # Largest crosstalk that is undone, which leaves at least a fifth of every wave. From 0.125 on some waves vanish.
 MOST_UNDONE = 0.1
-LEAST_COUNTED = 0.05  # least share of nine pixels that counts as one of them or more; less is rounding
+LEAST_COUNTED = 0.05  # a share of nine pixels below this is rounding, because one pixel is a ninth
 
 
 def is_undone(crosstalk: float) -> bool:

@@ -16,8 +16,8 @@ def interpolate_defects(raw: RawImage) -> RawImage:
     """Replace each listed pixel by the median of the nearest sound samples of its channel, and drop the list.
 
     The nearest samples are all those in a window that reaches one tile to either side, or two or three tiles if it
-    holds none; after that the median of the whole frame is used. It is the median because a cluster may include a
-    defect that isn't listed. A channel without any sound sample gets the black level.
+    holds none; after that the median of the whole frame is used. A median is used because a cluster may include
+    a defect that isn't listed. A channel without any sound sample gets the black level.
     """
     if raw.defects is None:
         return raw

@@ -37,7 +37,7 @@ KEEP_SHARE = 0.1  # largest share of the time that these copies take
 
 
 @own_mitsuba_variant()
-def render(  # noqa: PLR0913  its calls in README and tutorials go on
+def render(  # noqa: PLR0913  calls in README and tutorials have to keep working
     scene: Scene,
     size: tuple[int, int] | int,
     *,

@@ -140,12 +140,14 @@ def at_all(wavelengths: Spectra, interaction: Interaction, evaluate: Callable[[]
 
 
 def _row_at(surface: Bsdf, si: Interaction) -> UInt:
+    """Return the row of the reflectance at a point; a checkerboard has two."""
     if surface.which is None:
         return surface.row
     return dr.select(surface.which.eval(si)[0] > 0.5, surface.other_row, surface.row)
 
 
 def _weights_at(surface: Bsdf, si: Interaction, table: TableReader, step: UInt, active: Mask) -> Spectra:
+    """Read the reflectance at a point from the table, for all wavelengths of a path."""
     ones = table.read(_row_at(surface, si), step, active)
     if surface.weight is None:
         return ones
@@ -155,6 +157,7 @@ def _weights_at(surface: Bsdf, si: Interaction, table: TableReader, step: UInt, 
 
 
 def _reflectance_at(surface: Bsdf, si: Interaction, active: Mask = True) -> Spectrum4:
+    """Evaluate the reflectance at a point by its textures, at the four wavelengths of the interaction."""
     one = surface.reflectance.eval(si, active)
     if surface.weight is None:
         return one
@@ -162,6 +165,7 @@ def _reflectance_at(surface: Bsdf, si: Interaction, active: Mask = True) -> Spec
 
 
 def _share_at(surface: Bsdf, si: Interaction) -> Float:
+    """Return the share of the second reflectance of a blend, 0 to 1."""
     return dr.clip(surface.weight.eval_1(si), 0, 1)
 
 
@@ -188,6 +192,7 @@ def with_matte_surfaces(node: Node) -> Node:
 
 
 def _as_matte(node: Node) -> Node:
+    """Convert the node of one surface to ``matte`` if it can be; else convert the surfaces within it."""
     if node.get("type") == "diffuse" and isinstance(node.get("reflectance"), dict):
         return {**node, "type": "matte"}
     inner = [key for key, value in node.items() if isinstance(value, dict)]
@@ -218,6 +223,7 @@ def with_rows(node: Node) -> tuple[Node, tuple[Spectrum, ...]]:
 
 
 def _with_rows(node: Node, curves: dict[bytes, Spectrum]) -> Node:
+    """Apply `with_rows` to a node and all nodes within it; new rows are appended to `curves`."""
     made = {key: _with_rows(value, curves) if isinstance(value, dict) else value for key, value in node.items()}
     texture = node.get("reflectance")
     if node.get("type") != "matte" or not isinstance(texture, dict):
