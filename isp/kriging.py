@@ -154,7 +154,7 @@ def _within(positions: slice, asked: range) -> slice:
 def _weighted(
     values: Plane, weights: Plane, rows: slice, columns: slice, window: tuple[tuple[int, int], tuple[int, int]]
 ) -> Plane:
-    """Sum the samples of each window with the same weights, shape (channel, row, column)."""
+    """Compute the weighted sums of the samples in each window, by the same weights, shape (channel, row, column)."""
     (top, bottom), (left, right) = window
     around = values[rows.start + top : rows.stop - 1 + bottom, columns.start + left : columns.stop - 1 + right]
     windows = sliding_window_view(around, (bottom - top, right - left))[:: rows.step, :: columns.step]

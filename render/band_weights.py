@@ -230,7 +230,7 @@ def transport_of_light(
     """
     points = points_of(np.zeros(0), wavelength_nm, width_nm, light)
     lit = np.flatnonzero(points.lit)
-    shares = np.zeros((lit.size, points.nm.size))  # of each point in the mean over its band, weighted by the lamp
+    shares = np.zeros((lit.size, points.nm.size))  # share of each point in its band's mean, weighted by the lamp
     row = np.searchsorted(lit, points.band).clip(max=lit.size - 1)
     at = np.flatnonzero(lit[row] == points.band)
     shares[row[at], at] = (points.light * points.step_nm / width_nm[points.band])[at]
@@ -309,7 +309,7 @@ class Interpolation:
         run = self.points.run[self.known]
         each = run[:, None] == np.unique(run)
         even = scipy.linalg.cho_solve(factor, each.astype(np.float64))
-        total = of_light @ (self.points.run[self.points.band][:, None] == np.unique(run))  # where T is 1
+        total = of_light @ (self.points.run[self.points.band][:, None] == np.unique(run))  # if T is 1
         missing = total - result @ each
         return np.asarray(result + (missing / np.einsum("br,br->r", each, even)) @ even.T)
 

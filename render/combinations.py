@@ -118,7 +118,7 @@ def _parts_by_name(geometry: Node) -> dict[str, Node]:
 
 
 def _instances(geometry: Node, parts: Mapping[str, Node]) -> Iterator[_Instance]:
-    """Give all instances of shape groups, which may hold their group or refer to it."""
+    """Yield all instances of shape groups; an instance contains its group or refers to it."""
     for path, node in walk(geometry):
         if node.get("type") != "instance":
             continue

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rodcone.display import brief
 from rodcone.types import Floats, Planes
 
-SAMPLE_PIXELS = 1024  # with 40 bands the median of the error is then known to about 1 %
+SAMPLE_PIXELS = 1024  # pixels for the error's median; with 40 bands it is then known to about 1 %
 LEAST_UNCOVERED = 1e-6  # least share of a pixel that no light covers; less is rounding
 
 

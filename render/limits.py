@@ -71,7 +71,7 @@ class Limits:
         return -(-half // chunk) * chunk
 
     def next_look(self, count: int) -> int:
-        """Return after how many points of each half the error is checked next: powers of two, and half-way between."""
+        """Return the number of points of each half at which the error is checked next: 2^n, and half-way between."""
         if self.noise is None or count < LEAST_POINTS:
             return self.most_points if self.noise is None else min(LEAST_POINTS, self.most_points)
         power = 1 << count.bit_length() >> 1

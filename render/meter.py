@@ -16,7 +16,7 @@ from rodcone.errors import InputError
 from rodcone.types import Planes
 
 METER_BANDS = 4  # bands that are traced together: as quick as all at once, and the kernel compiles sooner
-HALF_SPP = 16  # samples per pixel of its film in each half: 2^17 paths give each band's number within 0.1 %
+HALF_SPP = 16  # samples per pixel of the meter's film in each half: 2^17 paths give each band's number within 0.1 %
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def _measured(scene: Scene, film: Film, seed: int) -> Irradiance:
 
 
 def _half(loaded: LoadedScene, film: Film, seed: int) -> Planes:
-    """Trace the irradiance over pi of each of the film's pixels, (group, band, h, w)."""
+    """Trace the irradiance over pi for each pixel of the film, (group, band, h, w)."""
     alike = np.ones(film.size, np.uint32)
     span = Span(0, HALF_SPP, 1)
     threads = HALF_SPP * METER_PIXELS**2

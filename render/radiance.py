@@ -87,7 +87,7 @@ class SpectralRadiance:
     @property
     def widths_nm(self) -> Floats:
         """Return the width of each band [nm], shape (band,)."""
-        assert self.width_nm is not None  # since construction
+        assert self.width_nm is not None  # `__post_init__` has set it
         return self.width_nm
 
     @property

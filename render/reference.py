@@ -160,7 +160,7 @@ def open_reference(path: str | Path) -> Reference:
 
 
 def _unpacks(file: Path) -> bool:
-    """Return whether a file unpacks, by its own directory, to at most `MOST_PACKED` times its size."""
+    """Return whether a file, by its list of contents, unpacks to at most `MOST_PACKED` times its size."""
     with ZipFile(file) as packed:
         return sum(part.file_size for part in packed.infolist()) <= MOST_PACKED * file.stat().st_size
 

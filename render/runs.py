@@ -309,7 +309,7 @@ def launch_threads(scenes: list[LoadedScene], film: Film, *, split: bool = False
 
 
 def _halves(loaded: LoadedScene, film: Film, seed: int, *, split: bool = False) -> list[Half]:
-    """Return the even and the odd half of the paths of a loaded scene."""
+    """Return the even and the odd half of a loaded scene's paths."""
     seeds = [seed_of(seed, loaded.groups[0], half) for half in range(2)]
     return [Half(loaded, tuple(tracers(loaded, film, PART_BANDS, each, split=split)), each, split) for each in seeds]
 

@@ -30,7 +30,8 @@ COLOURED_EMITTERS = ("envmap", "sunsky")
 OWN_SIDE = 256  # side [pixels] of a scene that states no size
 HELD_NM = (100.0, 20_000.0)  # range to which a table's end values are continued
 _REFUSED_EMITTERS = ("projector", "directionalarea", "timed_sunsky")
-_NO_SURFACES = (*EMISSION_PARAMETER, *COLOURED_EMITTERS, *_REFUSED_EMITTERS, "irradiancemeter")  # parts of a shape
+# Plug-ins in a shape that aren't its surface.
+_NO_SURFACES = (*EMISSION_PARAMETER, *COLOURED_EMITTERS, *_REFUSED_EMITTERS, "irradiancemeter")
 
 
 @dataclass(frozen=True)

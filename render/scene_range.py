@@ -16,7 +16,7 @@ SUNSKY_NM = (320.0, 720.0)  # end of Mitsuba's sunsky (Hosek & Wilkie 2012), whi
 CIE_NM = (360.0, 830.0)  # Mitsuba's MI_CIE_MIN and MI_CIE_MAX, beyond which the plug-ins of the next two lines are 0
 _WITHIN_CIE = ("blackbody", "d65")
 _EMISSION_WITHIN_CIE = (*_WITHIN_CIE, "envmap", "rgb")  # as reflectance, rgb is known at every wavelength
-_SLACK_NM = 0.01  # a thousandth of a band, for rounded edges
+_SLACK_NM = 0.01  # a thousandth of a band of 10 nm, for rounded edges
 
 
 def check_range(scene: Scene, shortest_nm: float, longest_nm: float) -> None:

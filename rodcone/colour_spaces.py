@@ -31,7 +31,7 @@ def rgb_to_xyz(primaries_xy: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 SRGB_TO_XYZ = rgb_to_xyz(SRGB_PRIMARIES_XY)
-# IEC 61966-2-1, equation (F.8): the inverse, rounded to four digits. Files and previews that others read hold to it.
+# IEC 61966-2-1, equation (F.8): the inverse, rounded to four digits. Files and previews for other programs use it.
 XYZ_TO_SRGB_ROUNDED = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 
 

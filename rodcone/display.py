@@ -1,5 +1,5 @@
-"""Display of values: one line of text instead of all numbers, curves and rows of pictures drawn by Matplotlib, and in a
-notebook a small picture, which is made only when it is shown.
+"""Display of values: one line of text instead of all numbers, plots of curves and of rows of pictures by Matplotlib,
+and in a notebook a small picture, which is made only when it is shown.
 """
 
 from collections.abc import Callable, Mapping
@@ -56,7 +56,7 @@ def _text(value: object) -> str:
 
 
 def _array(values: np.ndarray[Any, Any]) -> str:
-    """Return a small array in full, and of any other its shape, type and range."""
+    """Return a small array in full; for any other one return its shape, type and range."""
     if 0 < values.size <= MOST_ITEMS and values.ndim == 1:
         return f"[{', '.join(f'{x:.6g}' if values.dtype.kind == 'f' else str(x) for x in values)}]"
     what = f"<{' x '.join(map(str, values.shape))} {values.dtype}"
@@ -80,7 +80,7 @@ else:
 
 BLUE, ORANGE, INK = "#0068a8", "#b34700", "#1d2125"
 CHANNEL_COLOURS = {"R": "#b3261e", "G": "#00795a", "B": BLUE, "W": INK, "C": "#00838f", "Y": "#8a6d00"}
-SIZE = (6.0, 3.0)  # of a figure [inches]
+SIZE = (6.0, 3.0)  # width and height of a figure [inches]
 
 
 def new_axes() -> Axes:

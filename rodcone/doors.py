@@ -34,7 +34,7 @@ def at(place: str) -> Any:
 
 
 def require_no_shadow() -> None:
-    """Raise `ImportError` if a file beside the user's script has a package's name; the one line names the file.
+    """Raise `ImportError` if a file beside the user's script has a package's name; its one line names the file.
 
     Python finds a script `render.py` before the package `render`. If another distribution's package hides it instead,
     `rodcone doctor` says so.

@@ -54,7 +54,7 @@ def _almost(name: str, known: tuple[str, ...]) -> str:
 
 
 def _changes_nothing(value: object, nothing: str) -> bool:
-    """Return whether a value, or each one of a list, is empty or the value without effect."""
+    """Return whether a value, or each one of a list, is empty or equals `nothing`, which has no effect."""
     if isinstance(value, bool):
         return str(value).lower() == nothing
     parts = str(value).strip("{}[]() \n").replace(" ", "").split(",")

@@ -13,7 +13,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from rodcone.llvm import LIBLLVM  # it tells Dr.Jit where its LLVM is
+from rodcone.llvm import LIBLLVM  # its import tells Dr.Jit where LLVM is
 
 Backend = Literal["cuda", "llvm", "numpy"]
 # Arrays of a kernel, one value per thread. Their classes depend on the backend, so that a type checker sees only `Any`;

@@ -33,9 +33,9 @@ _VIEW_ARRAYS = 10
 # or beside a photograph's colours, their sums while an image is formed, and the arrays for the raw files.
 _CAPTURE_BYTES = 185
 _VIEWER_BYTES = 212e6  # libraries, and what Dr.Jit doesn't give back
-_CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
+_CELL_BYTES = 800  # per pixel: mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
 _WORKER_BYTES = 350e6  # libraries and compiled kernels of a worker
-_MAPPED_BYTES = 200e6  # addresses of libraries and threads that a render loads, beyond the memory that they hold
+_MAPPED_BYTES = 200e6  # address space of libraries and threads of a render, beyond the memory that they use
 _FILE_BANDS = 40  # bands of a picture file
 _FILE_PACKING = 1.5  # bytes of a picture file in float32 over those on disk: 1.2 with a render's noise, more without
 
@@ -188,7 +188,7 @@ def _groups(root: Path) -> Iterator[Limit]:
 
 def _group_limit(folder: Path, most_file: str, used_file: str, cache_key: str) -> Limit:
     """Return the limit of one group, with cached files not counted as used; raise `ValueError` if it has none."""
-    most = int((folder / most_file).read_text())  # the word "max" without a limit
+    most = int((folder / most_file).read_text())  # without a limit it is the word "max"
     used = int((folder / used_file).read_text())
     cached = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())[cache_key]
     return Limit(f"what the control group's limit of {most / GB:.1f} GB leaves", most - used + float(cached))

@@ -119,7 +119,7 @@ def render_words(error: float, share: float = 0.0) -> str:
 
 
 def compile_note(seconds: float) -> str | None:
-    """Say how long a first render compiled; None if that is short."""
+    """Return a sentence on how long a first render compiled; None if that is short."""
     if seconds < LEAST_COMPILE_S:
         return None
     return f"render: compiling took {duration(seconds)}, once for these surfaces and so many bands"

@@ -4,8 +4,8 @@ A full sample is a lower bound of the light. Within a wide highlight, samples of
 few pixels, however, may cover samples of only some colours. The planes of the other colours are then filled from the
 dark around the lamp, so that it would get the colour of the samples that it happens to cover. Therefore a full pixel
 becomes white, unless a sample of its lamp shows a colour. A sample belongs to the lamp if it is lit, or if it lies in a
-rectangle, at most a tile wide and high, with lit samples at two opposite corners. In this way the dark blue sites of a
-sodium lamp of 2x2 pixels belong to the lamp.
+rectangle with lit samples at two opposite corners that are at most a tile's side apart along either axis. In this way
+the dark blue sites of a sodium lamp of 2x2 pixels belong to the lamp.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ FULL = 0.97  # a brighter sample counts as full, because shot noise and unequal 
 def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> NDArray[np.bool_]:
     """Mark pixels with a saturated sample of one of `channels` within `reach` pixels along either axis, (h, w).
 
-    By default the reach is one tile.
+    By default the reach is one pixel less than the tile's side.
     """
     return _nearby(raw.saturated & mask(raw.cfa, channels, raw.shape), _tile_side(raw) - 1 if reach is None else reach)
 
@@ -106,8 +106,8 @@ class Highlights:
 def white_lamps(raw: RawImage, gains: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Mark the full pixels of white lamps, shape (h, w).
 
-    These are full pixels within one tile of a full colour sample, if no colour sample of the lamp within one tile is
-    below `FULL` times the level of highlights, which would show that the lamp has a colour.
+    These are full pixels near a full colour sample (`saturated_nearby`), if no colour sample of the lamp that is as
+    near lies below `FULL` times the level of highlights, which would show that the lamp has a colour.
     """
     colours = "".join(raw.colour_channels)
     full = raw.saturated
@@ -122,7 +122,7 @@ def white_lamps(raw: RawImage, gains: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _enclosed(lit: NDArray[np.bool_], side: int) -> NDArray[np.bool_]:
-    """Mark all rectangles of at most `side` steps along either axis that have two opposite lit corners."""
+    """Mark all rectangles that have two opposite lit corners, at most `side` pixels apart along either axis."""
     height, width = lit.shape
     result = lit.copy()
     for down, across in product(range(side + 1), range(-side, side + 1)):

@@ -105,7 +105,7 @@ class WhiteBalance:
         neutral = self.response(raw)
         usable = ~saturated_nearby(raw, colours)
         groups = {colours: usable}
-        if "W" not in colours and "W" in names:  # before the colours, which then say where green's gain comes from
+        if "W" not in colours and "W" in names:  # W's group first: the colours then set green's gain and its source
             groups = {unit + "W": usable & ~saturated_nearby(raw, "W"), colours: usable}
         factors = np.ones(len(names))
         sources: dict[str, BalanceSource] = dict.fromkeys(names, "calibrated")

@@ -40,7 +40,7 @@ class _Inputs:
     electrons: Mosaic  # g_i(y) of the channel i that is sampled at y
     channel: NDArray[np.intp]  # that channel's number: where it is i, S_i(y) is 1
     h: Plane  # planes that patches are read from, padded by half a patch: one per channel, or one guide for all
-    alpha: Plane  # of eq. (6)
+    alpha: Plane  # alpha(y) of eq. (6)
     brightest: Plane  # electrons up to which a sample counts (`isp.interleaved.brightest`)
     white: int  # number of h_W among the planes
 

@@ -25,7 +25,7 @@ from rodcone.types import Floats
 
 WEIGHT = 3e-5  # weight of each: small, because the trained Gaussians know better which coloured surfaces are likely
 MEAN = 0.9  # mean root of signal; the root of a patch's mean light is 1
-EVEN, EVEN_PX = 0.3, 5.0  # standard deviation and length of a
+EVEN, EVEN_PX = 0.3, 5.0  # standard deviation of the process a, and its length [pixels]
 CONTRAST, CONTRAST_PX = 0.6, 2.5  # the same of b; so short that lines not quite two pixels apart are included
 GREY = 0.015  # standard deviation of q_c; with a larger one, yellow or pale blue things become striped
 REST, REST_OF_CHANNEL = 1e-4, 1e-5  # further variance of each pixel: common to its channels, and of each channel alone

@@ -207,7 +207,7 @@ def pad_mosaic(tile: Tile, *samples: NDArray[Any]) -> tuple[NDArray[Any], ...]:
     Where the reflected pixel has another channel, the nearest pixel beside it with the right one takes its place.
     """
     wide = tuple(padded(plane, PATCH) for plane in samples)
-    if max(len(tile), len(tile[0])) <= 2:  # reflection keeps a tile of two
+    if max(len(tile), len(tile[0])) <= 2:  # reflection keeps the phase of a tile of two pixels
         return wide
     shape = samples[0].shape
     sides = [border(length, PATCH) for length in shape]

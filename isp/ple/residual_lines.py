@@ -32,7 +32,7 @@ from rodcone.types import Singles
 from sensor.cfa import Tile, channel_map, channels
 
 GUIDES = ("W", "G")  # the guide is the first of these that a mosaic has
-MIN_REL_VARIANCE = 1e-4  # of the guide's squared mean: added to var(g) so that an even guide gives a = <c> / <g>
+MIN_REL_VARIANCE = 1e-4  # share of <g>^2 that is added to var(g), so that an even guide gives a = <c> / <g>
 MISS_FACTOR = 0.25  # eq. (4): the squared error of interpolating b, over b's squared difference from its neighbours
 LEAST_MISS = 0.05  # eq. (4): `least`, if a pixel's posterior variance equals a sample's noise [units of noise^2]
 OWN_WEIGHT = 0.62  # weight of g - c at a colour's own sample; g - c at the guide's sample beside it has the rest

@@ -22,7 +22,7 @@ from isp.ple.units import readings
 from rodcone.types import Floats, Singles
 
 STEP = 1.25  # ratio of light from one table to the next brighter one
-LIGHT_ERROR = 0.12  # relative standard deviation of a patch's light, the step's included
+LIGHT_ERROR = 0.12  # relative standard deviation of the error of a patch's light, including that by `STEP`
 PILOT_ERROR = 0.03  # further error of a coarser scale's means, beside their variance [share of the light]
 PILOT_VARIANCE = 0.02  # typical variance of a coarser scale's means [units of noise^2]
 BRIGHTNESS = 0.98  # share of that variance that lies in brightness; a coarser scale knows colour much better

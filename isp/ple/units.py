@@ -98,7 +98,7 @@ def readings(dark_e: float) -> Readings:
     density /= density.sum()
     if dark_e < 1.0:
         counts = np.arange(2 * electrons[-1, 0])
-        factorials = np.concatenate([[0.0], np.cumsum(np.log(counts[1:]))])  # their logarithms
+        factorials = np.concatenate([[0.0], np.cumsum(np.log(counts[1:]))])  # logarithms of the factorials
         # Without electrons, the logarithm is so low that every count but 0 has a share of 0.
         shares = np.exp(counts * np.log(np.maximum(electrons, _FEWEST)) - electrons - factorials)
         values = transform(counts[:, None] + dark_e * _NORMAL, dark_e)

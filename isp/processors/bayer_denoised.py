@@ -23,7 +23,7 @@ from sensor.cfa import Tile, channel_map
 from sensor.raw import RawImage
 
 Demosaic = Callable[[Plane, Tile], Image]
-Denoise = Callable[[Image, Sequence[float]], Image]  # takes planes and the standard deviation of each plane's noise
+Denoise = Callable[[Image, Sequence[float]], Image]  # function of planes and each plane's standard deviation of noise
 # Noise that BM3D assumes after demosaicking, over the mosaic's noise (docs/decisions/0039-the-strongest-opponents.md).
 NOISE_AFTER_DEMOSAICKING = 1.75
 # Orthonormal rows that turn R, G and B into their mean and two differences.

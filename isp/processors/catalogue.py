@@ -103,13 +103,13 @@ class Processor:
         white_balance = WhiteBalance.of(raw, neutral, balance)
         scale = 1.0
         if raw.crosstalk:
-            # A neutral has the electrons that the unit's channel reads of it, with crosstalk.
+            # In the picture a neutral has the electrons that the unit channel reads, with crosstalk.
             unit = raw.channels.index(self.unit or raw.unit_channel)
             behind_filters = white_balance.without_crosstalk(raw)
             scale = float(white_balance.response(raw)[unit] / behind_filters.response(raw)[unit])
             raw, white_balance = without_crosstalk(raw, white_balance.expected(raw)), behind_filters
         colours = ColourFit.of(matrix)
-        if self.noise_gains is not None and set(self.colours) <= set(raw.channels):  # others are refused below
+        if self.noise_gains is not None and set(self.colours) <= set(raw.channels):  # other mosaics are refused below
             colours = colours_in_noise(raw, colours, white_balance, self.unit, self.noise_gains)
         picture = self.picture(raw, colours, balance=white_balance, **options)
         return picture if scale == 1.0 else replace(picture, rgb=picture.rgb * scale)

@@ -40,7 +40,7 @@ LAYERS = {  # shape of each layer's weights: out, in, height, width
     "fullres_processor.post_conv": (64, 6, 3, 3),
     "fullres_processor.output": (3, 64, 1, 1),
 }
-REACH = 32  # distance [pixels] on which a value depends: fifteen 3x3 filters of 2x2 tiles, and one of pixels
+REACH = 32  # distance [pixels] up to which a value depends on others: fifteen 3x3 filters of 2x2 tiles, one of pixels
 WHITE = 0.999  # quantile of a frame's samples that is scaled to 1 for the network
 MOST_BYTES = 1 << 24  # largest wheel that is read; demosaicnet's has 3.7 MB
 _LEAST = 1e-6  # least divisor [units of noise]

@@ -15,7 +15,7 @@ from render.radiance import SpectralRadiance
 from render.spectrum import Spectrum
 from rodcone.types import Floats
 
-WIDEST_NM = 10.0  # bands in which transport is kept
+WIDEST_NM = 10.0  # largest width of the bands in which transport is kept
 MOST_UNEXPLAINED = 1e-3  # share of a picture's light in bands that its lamp leaves dark; with more it is another lamp
 
 

@@ -34,7 +34,7 @@ def denoise_means(
     halves = zip(means.indirect.mean, means.indirect.difference, strict=True)
     smooth = np.stack([denoised(light, difference, albedo, normal) for light, difference in halves])
     return Denoised(
-        radiance=np.maximum(means.light.mean - means.indirect.mean, 0) + smooth,  # rounding may go under 0
+        radiance=np.maximum(means.light.mean - means.indirect.mean, 0) + smooth,  # rounding may make it negative
         indirect=means.indirect,
         folds=folds.light,
         fold_points=folds.count,

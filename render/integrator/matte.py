@@ -170,7 +170,10 @@ def _share_at(surface: Bsdf, si: Interaction) -> Float:
 
 
 def _density(wi: Vector, wo: Vector, twosided: bool) -> Float:
-    """Compute cosine over pi (BRDF times cosine for a reflectance of 1) if both directions are on one open side."""
+    """Compute cosine over pi, which is BRDF times cosine for a reflectance of 1.
+
+    It is 0 unless both directions are on the same side, and that side reflects.
+    """
     lit = wi.z * wo.z > 0 if twosided else (wi.z > 0) & (wo.z > 0)
     return dr.select(lit, dr.abs(wo.z) * dr.inv_pi, 0.0)
 

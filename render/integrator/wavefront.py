@@ -150,7 +150,7 @@ def traced_at(
 
 
 def _blocks(rate: int, pixels: NDArray[np.intp], span: Span) -> NDArray[np.uint32]:
-    """List the blocks of `span.chunk` points of pixels of one rate: pixel and first point, shape (2, block)."""
+    """List the blocks, each of `span.chunk` points, for pixels of one rate: pixel and first point, shape (2, block)."""
     chunk, pixel, block = np.meshgrid(np.arange(span.chunks), pixels, np.arange(rate), indexing="ij")
     first = span.start * rate + (chunk * rate + block) * span.chunk
     return np.stack([pixel.ravel(), first.ravel()]).astype(np.uint32)
@@ -159,7 +159,7 @@ def _blocks(rate: int, pixels: NDArray[np.intp], span: Span) -> NDArray[np.uint3
 def _launched(
     trace: Callable[[UInt, Points], Channels], pixel_of: UInt, first_of: UInt, chunk: int, seed: int
 ) -> Channels:
-    """Trace the paths of all points of blocks of `chunk` points, and evaluate their channels."""
+    """Trace a path for each point of the blocks, which have `chunk` points each, and evaluate the channels."""
     mi = mitsuba_module()
     thread = dr.arange(mi.UInt32, dr.width(pixel_of) * chunk)
     length = dr.opaque(mi.UInt32, chunk)

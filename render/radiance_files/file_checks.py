@@ -76,7 +76,7 @@ def bands_between(wavelength_nm: Floats) -> tuple[Floats, Floats]:
     """
     nm = np.asarray(wavelength_nm, dtype=np.float64)
     if nm.size < 2 or not np.all(np.isfinite(nm)) or not np.all(nm[1:] > nm[:-1]) or nm[0] <= 0:
-        return nm, band_widths(nm)  # which refuses it
+        return nm, band_widths(nm)  # this raises the error
     steps = np.diff(nm)
     if np.allclose(steps, steps[0], rtol=1e-6):
         return nm, band_widths(nm)

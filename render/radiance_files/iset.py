@@ -28,10 +28,10 @@ _KEYS = (
     *("scene/data/max", "mcCOEF", "basis/basis", "basis/wave", "imgMean", "photons", "data", "wave", "wavelength"),
 )
 _PHOTONS = ("illuminant/data/photons", "illuminant/spectrum/wave")
-_ENERGY = ("illuminant/data", "illuminant/wavelength")  # of files before illuminants were structs
+_ENERGY = ("illuminant/data", "illuminant/wavelength")  # keys of older files, whose illuminants aren't structs
 _OF_LAMP = tuple(place + key for place in ("scene/", "") for key in (*_PHOTONS, *_ENERGY))
-_VIEWS_DEG = ("scene/wAngular", "scene/fov", "fov")  # field of view across the picture; the last is that of
-# ieSaveMultiSpectralImage
+# Field of view across the picture; the last key is that of ieSaveMultiSpectralImage.
+_VIEWS_DEG = ("scene/wAngular", "scene/fov", "fov")
 Numbers = Mapping[str, NDArray[Any]]  # a file's arrays by the keys above
 
 

@@ -186,7 +186,7 @@ def _failed(
 def _store(
     jit: ModuleType, totals: list[Sums], pixels: list[tuple[int, int]], threads: Threads, shape: Shape, sums: KernelSums
 ) -> list[Float]:
-    """Store the loop's sums; return the arrays they are stored into, which aren't evaluated yet."""
+    """Store the loop's sums; return the arrays that hold them, which aren't evaluated yet."""
     targets = [sums.weight, sums.mean, sums.noise_gain] + [sums.unit] * shape.running
     stored = [
         (weight, value / weight, square / dr.square(weight), *largest) for weight, value, square, *largest in totals

@@ -39,7 +39,7 @@ def window_steps(tile: int) -> range:
 
 
 def surroundings_steps(tile: int) -> range:
-    """Return the steps in tiles to the middles of the windows of the surroundings along one axis."""
+    """Return the steps in tiles from a tile to the middles of the surroundings' windows along one axis."""
     step = max(round(APART_PX / tile), 1)
     return range(-2 * step, 2 * step + 1, step)
 

@@ -95,7 +95,7 @@ def _start(
 
 
 def _empty_sums(jit: ModuleType, rows: Span, width: int, pattern: Pattern) -> KernelSums:
-    """Allocate arrays for the results of the blocks of all phases; at the fixed scale the unit stays as it is here."""
+    """Allocate arrays for the results of the blocks of all phases, with the unit of the fixed scale."""
     # Whole blocks cover the strip and the tile - 1 rows and columns by which phases begin early.
     size = [
         -(-(length + tile - 1) // block) * block
