@@ -1,7 +1,7 @@
-"""Work of a sweep that goes on beside its cells, in a thread: the next scene is made while workers make cells.
+"""A thread that makes a sweep's next scene while workers make the cells of the present one.
 
-One thing at a time: memory holds one render, whatever the number of scenes. Dr.Jit belongs to that thread meanwhile; so
-the cells must be made in other processes.
+It makes one scene at a time, so that memory holds one render, whatever the number of scenes. While it works, this
+process uses Dr.Jit in this thread alone; so the cells must be made in other processes.
 """
 
 import time
@@ -19,7 +19,7 @@ LOOK_S = 0.2  # seconds between two reports of progress while a caller waits
 
 
 class Spans:
-    """Stages of a thread that works beside the run's own clock, with the times at which they began and ended."""
+    """Stages of a thread's work, with the times at which they began and ended."""
 
     def __init__(self) -> None:
         self._spans: list[tuple[str, float, float]] = []
@@ -37,18 +37,18 @@ class Spans:
 
 
 class Ahead(Generic[Result]):
-    """Call in a thread of its own, which begins at once.
+    """Call of a function in a thread of its own, which begins at once.
 
     Parameters
     ----------
     call : callable
-        Function of the stages, in which it notes its seconds, and of its progress, which raises `KeyboardInterrupt`
-        after `stop`: a render then keeps what it has and ends.
+        Function that is called with `Spans`, in which it notes its stages, and with a function to which it reports its
+        progress. After `stop` that function raises `KeyboardInterrupt`, so that a render keeps what it has and ends.
 
     Attributes
     ----------
     share : float
-        Share of it that is done, as its progress last reported.
+        Share of the work that is done, from 0 to 1, as the call reported it last.
     """
 
     def __init__(self, call: Callable[[Spans, Progress], Result]) -> None:
@@ -56,7 +56,7 @@ class Ahead(Generic[Result]):
         self.share = 0.0
         self._error = float("inf")
         self._future: Future[Result] = Future()
-        # It is no pool's worker, for which Python would wait at its end: a second Ctrl-C ends the program at once.
+        # Python waits for a pool's threads before it exits, but not for a daemon: a second Ctrl-C ends the program.
         Thread(target=self._make, args=(call,), daemon=True).start()
 
     def _make(self, call: Callable[[Spans, Progress], Result]) -> None:

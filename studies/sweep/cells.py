@@ -1,4 +1,4 @@
-"""Cells of a study: one picture each, all that decides it, its key, and the random streams of its noise."""
+"""Cells of a study. A cell is one picture: all that decides it, its key, and the random streams of its noise."""
 
 import json
 from collections.abc import Sequence
@@ -28,9 +28,10 @@ class RenderRecord:
         Hash of the radiance.
     facts : RenderFacts
     brightest_share : float or None
-        Monte Carlo share in the brightest light, for a study that asks for one (`RenderLimits.noise_share`).
+        Monte Carlo variance over the sensor's own noise variance in the study's brightest light; None unless the study
+        states a `RenderLimits.noise_share`.
     notes : tuple of str
-        Notes on what had to be assumed of the scene, and on what fell back.
+        Notes on what had to be assumed about the scene, and on parts that ran in NumPy for want of a backend.
     """
 
     content: str
@@ -40,7 +41,7 @@ class RenderRecord:
 
 
 def render_text(record: RenderRecord) -> str:
-    """Return as JSON what a row states of its render, apart from what has a column of its own."""
+    """Return as JSON what a row says about its render in one column; some facts have columns of their own."""
     facts = asdict(record.facts)
     for column in ("variant", "seconds", "spp", "bands"):
         del facts[column]
@@ -49,7 +50,7 @@ def render_text(record: RenderRecord) -> str:
 
 @dataclass(frozen=True)
 class Cell:
-    """Picture that is to be made. It travels to its worker as it is; arrays travel as paths.
+    """Picture that is to be made. It is sent to a worker by pickle, with paths in place of arrays.
 
     Attributes
     ----------
@@ -66,9 +67,9 @@ class Cell:
     frame : UnitFrame
         Frame whose sensor has the processor's mosaic and the modelled lens.
     made_by : Provenance
-        Provenance in the process that asks; a worker with other versions or engines refuses the cell.
+        Provenance in the process that runs the sweep; a worker with other versions or engines refuses the cell.
     colours : ColourFit or None
-        Fit of the processor's balanced planes under the scene's light; a cell has it once it is to be made.
+        Fit of the processor's colours under the scene's light; None until the cell has to be made.
     white_cd_m2 : float
         Luminance shown as white.
     pictures : Path
@@ -111,7 +112,7 @@ class Cell:
 
 
 def labels(condition: Condition) -> dict[str, Any]:
-    """Return a condition as a row names it: a file by its name, without its folder."""
+    """Return the values of a condition as rows name them: a file by its name, without its folder."""
     files = {name: label(getattr(condition, name)) for name in ("spectrum", "sensor")}
     return vars(condition) | {"scene": condition.scene.label, **files}
 

@@ -1,4 +1,4 @@
-"""Cells on a cluster of `dask.distributed` (extra ``cluster``): the same cells and rows as in one process."""
+"""Run cells on a cluster of `dask.distributed` (extra ``cluster``), with the same rows as on one machine."""
 
 import logging
 import os
@@ -25,20 +25,20 @@ PATIENCE_S = 30.0  # time for scheduler and workers to answer
 
 @contextmanager
 def on_cluster(address: str, patience_s: float = PATIENCE_S) -> Iterator[Callable[..., Generator[Any, None, None]]]:
-    """Connect to a scheduler and give a function that runs cells on its workers; dask replaces a worker that dies.
+    """Connect to a scheduler and yield a function that runs cells on its workers; dask replaces a worker that dies.
 
     Parameters
     ----------
     address : str
         Address of the scheduler: ``tcp://127.0.0.1:8786``, or ``tls://...`` with dask's own settings for TLS.
     patience_s : float
-        Time to wait for it [s]: a batch job may start its scheduler a moment before its sweep.
+        Time to wait for the scheduler [s], because a batch job may start it only a moment before its sweep.
 
     Raises
     ------
     InputError
-        For a cluster that doesn't answer, has no workers, workers of other code or with several threads each; later
-        for one that goes away, or a cell that ended its worker too often.
+        For a cluster that doesn't answer, or has no workers, workers with other code, or workers with several threads.
+        While cells run: for a cluster that goes away, or a cell whose workers died too often.
     """
     check_address(address)
     if find_spec("distributed") is None:
@@ -51,7 +51,7 @@ def on_cluster(address: str, patience_s: float = PATIENCE_S) -> Iterator[Callabl
 def _run(
     client: Any, address: str, slots: int, threads: int, cells: Sequence[Task], make: Callable[..., Any] = run_cell
 ) -> Generator[Any, None, None]:
-    """Run cells; each worker holds two, so that it never waits for the next."""
+    """Run cells; each worker is given two at a time, so that it never waits for the next one."""
     from distributed import KilledWorker
 
     executor = client.get_executor(pure=False)
@@ -66,7 +66,7 @@ def _run(
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep dask's tracebacks off stderr: `on_cluster` raises one line in their place."""
-    import distributed  # noqa: F401 - now: its import sets the levels
+    import distributed  # noqa: F401 - before the levels below, because the import sets them too
 
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
     before = [logger.level for logger in loggers]
@@ -80,7 +80,7 @@ def _quiet() -> Iterator[None]:
 
 
 def check_address(address: str) -> None:
-    """Raise `InputError` for no scheduler's address; warn where cells would travel an open network unencrypted."""
+    """Raise `InputError` unless a text is a scheduler's address; warn if cells would cross a network unencrypted."""
     parts = urlsplit(address)
     try:
         complete = parts.scheme in ("tcp", "tls") and parts.hostname and parts.port
@@ -114,7 +114,7 @@ def _client(address: str, patience_s: float) -> Any:
 
 
 def _check_encryption(address: str) -> None:
-    """Raise `InputError` where dask's settings for TLS don't fit the address; dask itself ends in a traceback."""
+    """Raise `InputError` if dask's settings for TLS don't fit the address; dask's own error would be a traceback."""
     from distributed.security import Security
 
     try:
@@ -169,9 +169,6 @@ def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:
 
 
 def _facts() -> tuple[dict[str, str], int, bool]:
-    """Return the versions that compute in this process, its machine's cores, and whether its working directory is safe.
-
-    It is safe if Python imports nothing from it.
-    """
+    """Return this process's versions and cores, and whether Python imports nothing from its working directory."""
     safe = sys.flags.safe_path or bool(os.environ.get("PYTHONSAFEPATH"))
     return {**versions(), "engine": backend()}, cores(), safe

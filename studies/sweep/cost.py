@@ -1,4 +1,4 @@
-"""What a sweep will take: cells, time and memory, before anything is computed."""
+"""Estimate what a sweep needs before anything is computed: cells, time and memory."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -22,15 +22,15 @@ from studies.study.study import REFERENCE, SceneChoice, Study, conditions, study
 from studies.sweep.database import FILE, made_with, read_results
 from studies.sweep.provenance import versions
 
-# Processor seconds on a server's cores with AVX-512, measured on 16 cells of the demo in one process.
-_SHARED_S = 7e-7  # per pixel and band of each image that cells share
-_READ_S = 3e-7  # per pixel and band of a picture file
+# All times are processor seconds on a server's cores with AVX-512, measured on 16 cells of the demo in one process.
+_SHARED_S = 7e-7  # to form an image that cells share, per pixel and band
+_READ_S = 3e-7  # to read a picture file, per pixel and band
 _PILOT_S = 6.0  # a scene's pilot render, and the effects that a plan computes from it
 _PICTURE_PILOT_S = 1.1  # the same for a picture file, which is only made smaller; measured by going on with two
 _LIVE_SPP = 64  # samples per pixel of the render that is compared with a reference
-_CELL_S = 5e-6, 0.03  # capture, metrics and files per pixel, and in a cell of any size
+_CELL_S = 5e-6, 0.03  # capture, metrics and files: per pixel, and per cell whatever its size
 _FRAME_S = 5e-7, 0.02  # the same for a raw frame and its truth
-# Development per pixel, and the first calls in each process, by words in a processor's name.
+# Words in a processor's name, the time in which it develops a pixel, and that of its first calls in each process.
 _DEVELOP_S = (
     (("bm3d", "park"), 4e-5, 2.0),
     (("ple",), 5e-6, 2.2),
@@ -39,9 +39,10 @@ _DEVELOP_S = (
 )
 _ANY_DEVELOP_S = 1e-6, 0.3
 _FIRST_S = 0.7  # first captures and metrics of a process
-_REPORT_S = 2.5, 0.05, 1e-4  # the report, each cell whose picture it shows, and each other cell
-SHOWN = 1000  # cells whose pictures a report shows, `MOST_CELLS` of `report_sweep`, which is slow to import
-_HALF_SIZE = 0.25  # share of the pixels at half the width and height
+_REPORT_S = 2.5, 0.05, 1e-4  # a report without cells, each cell whose picture it shows, and each other cell
+# Most cells whose pictures a report shows. It repeats `MOST_CELLS` of `report_sweep`, which is slow to import.
+SHOWN = 1000
+_HALF_SIZE = 0.25  # part of the pixels that is left at half the width and height
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ class Estimate:
     largest_bytes: float
 
     def words(self) -> str:
-        """Return what is made, then time and memory, and the time for half of it."""
+        """Return one line: what is made, its time and memory, and the time at half the size or with half the cells."""
         return (
             f"{self.cells} cells, at most {self.kept} kept from the last run; {self.renders} to render; about "
             f"{duration(self.seconds)} with {self.workers} workers, at most {self.bytes / 1e9:.1f} GB of memory, what "
@@ -112,7 +113,7 @@ class _Part:
 def estimated(
     study: Study, out: Path, workers: int, *, reference: bool = False, planned: bool = False, frames: bool = False
 ) -> Estimate:
-    """Estimate a sweep into a folder by the study as stated, which is the most that a plan chooses.
+    """Estimate a sweep into a folder from the study's own settings; a plan chooses at most these.
 
     Parameters
     ----------
@@ -120,7 +121,7 @@ def estimated(
     out : Path
     workers : int
     reference : bool
-        Whether everything is modelled.
+        Whether the sweep models everything, as the starting point ``reference`` does.
     planned : bool
         Whether a plan renders its pilots before the sweep.
     frames : bool
@@ -154,7 +155,10 @@ def estimate_cost(
     planned: bool = False,
     frames: bool = False,
 ) -> Estimate:
-    """Estimate a sweep of opened scenes; `kept` of its cells are made already. Other parameters are `estimated`'s."""
+    """Estimate a sweep of opened scenes, `kept` of whose cells exist already.
+
+    The other parameters are as in `estimated`.
+    """
     cells = len(conditions(study)) * len(study.seeds) * len(study_mosaics(study) if frames else study.processors)
     parts = [_part(study, plan, opened) for opened in scenes.values()]
     need = _memory(parts, workers, ahead=workers > 1 and not frames)
@@ -227,13 +231,13 @@ def _seconds(
         pixels, of_sensor = part.pixels * scale, part.sensor_pixels * scale
         light = render_seconds(1, part.bands, part.groups, part.spp) * pixels if part.spp else 0.0
         lights += min(light, study.render.max_seconds or light) * max(1, 2 * part.times)
-        exposed = len(study.exposures) if part.times else 1  # each reads its times and forms its images
+        exposed = len(study.exposures) if part.times else 1  # each exposure averages the times, and forms images
         of_light = pixels, part.bands, part.groups
         seconds += part.times * (another_s(*of_light) + exposed * averaged_s(*of_light))
         each = least_s + (pixel_s + sum(costs[0] for costs in own) / len(own)) * of_sensor
         at_once = max(1, min(workers, cores()))
         seconds += pixels * part.bands * (shared_s * images * exposed + _READ_S * (part.spp == 0))
-        seconds += part.bands * TABLE_BAND_S * behind_tables  # whose images of points all mosaics share
+        seconds += part.bands * TABLE_BAND_S * behind_tables  # all mosaics share the lens's images of points
         seconds += cells / len(parts) * each / at_once
         seconds += planned * (_PILOT_S if part.spp else _PICTURE_PILOT_S)
     seconds += picture_s * min(cells, SHOWN) + row_s * max(cells - SHOWN, 0.0)
@@ -241,7 +245,7 @@ def _seconds(
 
 
 def _develop_s(processor: str) -> tuple[float, float]:
-    """Return the processor time that developing a pixel takes, and that of the first calls in a process [s]."""
+    """Return the processor time to develop a pixel, and that of the first calls in a process [s]."""
     for words, pixel_s, first_s in _DEVELOP_S:
         if any(word in processor for word in words):
             return pixel_s, first_s

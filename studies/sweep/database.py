@@ -1,6 +1,6 @@
-"""The results database of a sweep: an SQLite file with a row for each cell, written whole or not at all.
+"""The results database of a sweep: an SQLite file with a row for each cell. A row is written whole or not at all.
 
-Each row ends in its digest: SQLite itself doesn't notice a number that has changed.
+Each row ends in its digest, because SQLite doesn't notice if a number in the file was changed by accident.
 """
 
 import errno
@@ -56,8 +56,8 @@ _CREATE = (
 
 @dataclass(frozen=True)
 class LastRun:
-    """The last run in a folder: its study, its seconds per stage, how many cells it asks for, the rows made, and the
-    hash of all that but the seconds.
+    """The last run in a folder: its study, its seconds per stage, the number of cells that it asks for, and their rows
+    as far as they are made. `content` is a hash of all of this except the seconds.
     """
 
     study: dict[str, Any]
@@ -87,7 +87,7 @@ def open_results(folder: Path) -> Iterator[sqlite3.Connection]:
 
 @contextmanager
 def read_results(folder: Path) -> Iterator[sqlite3.Connection]:
-    """Open the results database of a folder to read from it alone; a sweep may go on writing to it.
+    """Open the results database of a folder for reading only; a sweep may go on writing to it.
 
     Raises
     ------
@@ -99,8 +99,8 @@ def read_results(folder: Path) -> Iterator[sqlite3.Connection]:
     path = folder / FILE
     if not path.is_file():
         raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
-    # SQLite also reads the write-ahead log, and it makes one that only a connection with the right to write removes. If
-    # the folder can't be written and has no log, nobody else writes, and the file alone can be read.
+    # SQLite also reads the write-ahead log. If there is none it makes one, which only a connection with the right to
+    # write removes. If the folder can't be written and has no log, nobody writes to it, and the file is all there is.
     log = path.with_name(f"{FILE}-wal")
     options = "mode=rw" if os.access(folder, os.W_OK) else "mode=ro" if log.exists() else "mode=ro&immutable=1"
     with _connected(path, options) as base:
@@ -123,7 +123,7 @@ def _connected(path: Path, options: str) -> Iterator[sqlite3.Connection]:
         raise InputError(f"{path}: it is no results database (its names are no text); move it away") from error
     except sqlite3.DatabaseError as error:
         code = getattr(error, "sqlite_errorcode", None)
-        if code is None:  # the error is in our statement, not in the file
+        if code is None:  # the error is in our SQL statement, not in the file
             raise
         if code & 0xFF in _DAMAGED:
             raise InputError(
@@ -171,7 +171,7 @@ def _has_tables(base: sqlite3.Connection, path: Path) -> bool:
 
 
 def add(base: sqlite3.Connection, row: Row) -> None:
-    """Add a row, at once and whole; one of the same key is replaced."""
+    """Add a row at once, whole or not at all; it replaces a row with the same key."""
     values = [float(value) if column in _REAL and value is not None else value for column, value in vars(row).items()]
     _put(base, "cells", values)
 
@@ -184,12 +184,12 @@ def done(base: sqlite3.Connection, pictures: Path, keys: Iterable[str]) -> set[s
 
 
 def rows(base: sqlite3.Connection, everything: bool = False) -> Iterator[Row]:
-    """Give the rows of the cells that the last run asked for, in the study's order; with `everything` all rows.
+    """Yield the rows of the cells that the last run asked for, in the study's order; with `everything` all rows.
 
     Raises
     ------
     InputError
-        Where a row isn't what was written.
+        For a row that has changed since it was written.
     """
     chosen = (
         f"SELECT {_COLUMNS} FROM cells ORDER BY key"
@@ -206,7 +206,7 @@ def last_run(folder: Path) -> LastRun:
     Raises
     ------
     InputError
-        As `read_results`, where a row isn't what was written, and where the last run has made no cell yet.
+        As `read_results`, for a row that has changed since it was written, and if the last run has made no cell yet.
     OSError
         Where the file can't be read.
     """
@@ -225,14 +225,14 @@ def last_run(folder: Path) -> LastRun:
 
 
 def content(base: sqlite3.Connection) -> str:
-    """Return the hash of what `last_run` reads, but for the seconds of the stages."""
+    """Return a hash of what `last_run` reads, except the seconds of the stages."""
     study = base.execute("SELECT study FROM runs ORDER BY rowid DESC LIMIT 1").fetchone()
     cells = base.execute("SELECT place, wanted.key, digest FROM wanted LEFT JOIN cells USING (key) ORDER BY place")
     return digest([study, cells.fetchall()])
 
 
 def want(base: sqlite3.Connection, keys: Iterable[str | None]) -> None:
-    """Store the keys of the cells that this run asks for, in place of the last run's; None for a key not yet known."""
+    """Replace the list of cells that a run asks for by this run's, as keys; a key that isn't known yet is None."""
     base.execute("BEGIN IMMEDIATE")
     base.execute("DELETE FROM wanted")
     base.executemany("INSERT INTO wanted VALUES (?, ?)", enumerate(keys))
@@ -240,21 +240,21 @@ def want(base: sqlite3.Connection, keys: Iterable[str | None]) -> None:
 
 
 def note_keys(base: sqlite3.Connection, first: int, keys: Iterable[str]) -> None:
-    """Store the keys of a scene's cells, which its render has made known; `first` is the place of the first of them."""
+    """Store the keys of a scene's cells once it is rendered; `first` is the place of the first cell in the study."""
     base.execute("BEGIN IMMEDIATE")
     base.executemany("UPDATE wanted SET key = ? WHERE place = ?", ((key, at) for at, key in enumerate(keys, first)))
     base.execute("COMMIT")
 
 
 def noisiest(base: sqlite3.Connection) -> list[Row]:
-    """Return from each scene of the last run the row with the largest `mc_share`, in the study's order.
+    """Return for each scene of the last run the row with the largest `mc_share`, in the study's order.
 
     Of several rows with the same share the first one counts.
 
     Raises
     ------
     InputError
-        Where one of them isn't what was written.
+        If one of these rows has changed since it was written.
     """
     ranked = (
         "SELECT key, row_number() OVER (PARTITION BY scene ORDER BY mc_share DESC, place) AS rank, "
@@ -270,9 +270,10 @@ def made_with(base: sqlite3.Connection) -> dict[str, int]:
 
 
 def forget_old(base: sqlite3.Connection) -> None:
-    """Remove earlier rows of cells that this run has made anew with other versions or another variant's render.
+    """Remove earlier rows of cells that this run has made anew with other versions or with a render in another variant.
 
-    The backend counts among the versions; a row that differs in its engines alone is another plan's.
+    The versions include the backend's. A row that differs only in its engines is kept, because it belongs to a run with
+    another plan.
     """
     others = f"SELECT {_COLUMNS} FROM cells WHERE key NOT IN (SELECT key FROM wanted WHERE key IS NOT NULL)"
     if base.execute(f"{others} LIMIT 1").fetchone() is None:
@@ -297,7 +298,7 @@ def note_stages(base: sqlite3.Connection, run: int, stages: Mapping[str, float])
 
 
 def render_record(base: sqlite3.Connection, request: str) -> RenderRecord | None:
-    """Return the record of a render that was asked for before; None where there is none, or a damaged one."""
+    """Return the stored record of a render by the hash of its request; None if it is missing or damaged."""
     values = base.execute("SELECT * FROM renders WHERE request = ?", (request,)).fetchone()
     if values is None or not _is_sound(values):
         return None
@@ -305,7 +306,7 @@ def render_record(base: sqlite3.Connection, request: str) -> RenderRecord | None
 
 
 def note_render(base: sqlite3.Connection, request: str, record: RenderRecord) -> None:
-    """Keep the record of a render."""
+    """Store the record of a render under the hash of its request."""
     _put(base, "renders", [request, json.dumps(asdict(record))])
 
 

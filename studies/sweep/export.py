@@ -33,11 +33,12 @@ from studies.sweep.row import AXES, Row
 from studies.sweep.stored import read_whole
 
 _JSON_COLUMNS = ("render", "lens", "balance", "mean_electrons", "versions")
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what spreadsheets take for the start of a formula (OWASP, CSV injection)
+# A text that begins with one of these is run as a formula by spreadsheets (OWASP, CSV injection).
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def stream_rows(folder: Path, everything: bool = False) -> Iterator[Row]:
-    """Give the rows that `read_rows` returns one after the other, so that memory holds one at a time."""
+    """Yield the rows that `read_rows` returns, so that memory holds one at a time."""
     with read_results(folder) as base:
         yield from rows(base, everything)
 
@@ -65,14 +66,14 @@ def axis_values(texts: Sequence[str]) -> dict[str, str]:
 
 
 def write_csv(table: Iterable[Row], path: Path) -> None:
-    """Write rows to a ``.csv`` file (RFC 4180, with a header) as they come, whole or not at all.
+    """Write rows to a ``.csv`` file (RFC 4180, with a header) as they come; after an error the file is as it was.
 
     A text that a spreadsheet would run as a formula gets a quote in front.
 
     Raises
     ------
     InputError
-        For another ending.
+        For a file name with another ending.
     OSError
         Where the file can't be written.
     """
@@ -84,8 +85,8 @@ def write_csv(table: Iterable[Row], path: Path) -> None:
 def results_json(run: LastRun) -> bytes:
     """Return the study, the seconds by stage and the rows of a sweep's last run as the content of a JSON file.
 
-    A row has the columns of `studies.sweep.row.Row`, and those columns that hold JSON are objects; a number that isn't
-    finite is null.
+    A row has the columns of `studies.sweep.row.Row`. Columns that hold JSON become objects, and a number that isn't
+    finite becomes null.
     """
     cells = []
     for row in run.rows:
@@ -105,15 +106,15 @@ SAME = 1e-6
 ELECTRONS = "electrons_"  # prefix of a channel's name, for the mean electrons of its pixels
 MOST_ROWS = 10_000  # rows in results.json, 2.5 kB each; a larger sweep is exported as CSV
 CHARTS = {"pair_delta_e": ("metamers", pair_delta_e), "daylight_delta_e": ("color_checker", daylight_delta_e)}
-TRUE_PAIRS = "true_pair_delta_e"  # a figure of the light alone, whatever the camera
+TRUE_PAIRS = "true_pair_delta_e"  # a figure that depends on the light alone, not on the camera
 FIGURES = tuple(field.name for field in fields(Row) if "float" in str(field.type) or field.name == "substitution")
 
 
 @dataclass(frozen=True)
 class TableLine:
-    """A line of a table: its values of the axes, and each figure's mean and 95 % interval's half width over the seeds.
+    """A line of a table: its values of the axes, and over the seeds each figure's mean and half of its 95 % interval.
 
-    None stands for a figure that a cell lacks, and for the interval of one seed.
+    Both are None for a figure that a cell lacks; with one seed the half interval alone is None.
     """
 
     at: tuple[str, ...]
@@ -130,7 +131,7 @@ def lines(
     ----------
     rows : sequence of Row
     folder : Path
-        The sweep's folder, because some figures are measured in its pictures.
+        The sweep's folder, whose pictures some figures are measured in.
     by : sequence of str
         Axes, some of `AXES`.
     show : sequence of str
@@ -223,7 +224,7 @@ def _figure(row: Row, name: str, folder: Path) -> float | None:
 
 
 def mean_text(mean: float | None, half: float | None) -> str:
-    """Return a mean to three digits, `` ± `` and its half width; no half width where the seeds don't differ."""
+    """Return a mean to three digits, followed by `` ± `` and the half width unless the seeds agree; ``-`` for None."""
     if mean is None:
         return "-"
     if abs(mean) < SAME:

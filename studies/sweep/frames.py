@@ -1,7 +1,7 @@
-"""Files that all cells of one scene share, made once: the truth, and electrons per cd/m^2 and second.
+"""Files that all cells of one scene share, made once: the truth, and the electrons at 1 cd/m^2 and 1 s.
 
-Light is linear: a mosaic's expected electrons at any level and exposure are those at 1 cd/m^2 and 1 s times both. So a
-cell reads one (h, w) array from its path, whatever the number of bands, and no array goes through a scheduler.
+Light is linear: the expected electrons at any level and exposure time are those at 1 cd/m^2 and 1 s, multiplied by
+both. So a cell reads one (h, w) array from a file, whatever the number of bands, and no array is sent to a worker.
 """
 
 from collections.abc import Mapping, Sequence
@@ -50,18 +50,18 @@ class UnitFrame:
     white_cd_m2 : float
         Luminance shown as white.
     lux_per_cd_m2 : float or None
-        Illuminance of the reference plane; None without one, and where no level is in lux.
+        Illuminance of the reference plane; None without a plane, or if no level is in lux.
     auto_s, auto_w_s : float
-        Auto exposures there without a longest time [s]: for the preset's G, and for the modelled mosaic's W; where that
-        has no W, for its own unit.
+        Exposure times that the automatic exposures choose at 1 cd/m^2, without a limit [s]: `auto_s` for G of the
+        preset, `auto_w_s` for W of the modelled mosaic, or for its unit channel if it has no W.
     truth : Path
-        Linear sRGB of the noise-free scene, not clipped, `white_cd_m2` reads 1, (h, w, 3) float64; the same at every
-        level and for every sensor.
+        Linear sRGB of the noise-free scene, in which `white_cd_m2` is 1; not clipped; (h, w, 3) float64. It is the same
+        at every level and for every sensor.
     electrons : Path
-        Expected electrons, (h, w) float64; of a camera that shakes behind every filter, (h, w, channel).
+        Expected electrons, (h, w) float64; for a camera that shakes, those behind every filter, (h, w, channel).
     errors : Path
-        One draw of the unbiased light's Monte Carlo error, half the difference of its halves, (1, h, w) float32; or
-        what the denoised light's electrons differ by from two folds, (2, h, w).
+        Errors of the render in electrons, float32. For unbiased light one draw, half the difference of the render's
+        halves, (1, h, w). For denoised light its differences from two independent folds, (2, h, w).
     """
 
     key: str
@@ -92,12 +92,12 @@ def frame_key(
     render : str
         Digest of the render's content.
     opened : OpenedScene
-        The opened scene, whose own lights count.
+        The opened scene, with its own lights.
     spectrum : str
     study : Study
-        The study; of its levels it only counts whether one is in lux, because a frame then states lux per cd/m^2.
+        The study. Its levels matter only if one is in lux, because a frame then states lux per cd/m^2.
     preset, sensor : SensorConfig
-        The preset, by which the exposure is set, and the sensor as it is modelled.
+        The preset, by which an automatic exposure is set, and the sensor as it is modelled.
     exposure : str
         Exposure of a scene that moves, because its length blurs the scene; empty for other scenes.
     """
@@ -135,17 +135,18 @@ def make_frames(
     Parameters
     ----------
     transport : Transport
-        Lit by `studies.study.lit_scene.under`.
+        Light of the scene, lit as `studies.study.lit_scene.under` does.
     light : Light
         The light that the cameras' colours are set to.
     wanted : mapping of str to (SensorConfig, SensorConfig)
-        By key: the preset, whose auto exposure counts for every mosaic and lens, and the sensor as modelled.
+        For each frame's key the preset, by which an automatic exposure is set for every mosaic and lens, and the sensor
+        as it is modelled.
     study : Study
-        The study, whose levels and sensors' size count.
+        The study, for its levels and its `sensor_side_um`.
     samples : int
         Samples of the light along each side of a pixel.
     still : Transport, optional
-        The truth of a scene that moves: as it is at the exposures' middle.
+        For a scene that moves, its light at the middle of the exposures, which gives the truth.
     """
     if transport.denoised is None:
         views = (transport.relight(luminance_cd_m2=1.0), *transport.relight_halves(luminance_cd_m2=1.0))
@@ -184,9 +185,10 @@ def make_frames(
 def exposure_of(
     frame: UnitFrame, exposure: str, gain: str, luminance_cd_m2: float, longest_s: float
 ) -> tuple[float, SensorConfig]:
-    """Return the exposure time of a frame at a mean luminance [s], and the camera at the gain that is used then.
+    """Return the exposure time of a frame at a mean luminance [s], and the camera at the gain that it then has.
 
-    `exposure` and `gain` are as `studies.study.study.Condition` has them. A rule for the exposure may raise the gain.
+    `exposure` and `gain` are texts as in `studies.study.study.Condition`. If `exposure` is a rule, it may raise the
+    gain.
     """
     asked_s = parse_exposure(exposure)
     sensor = at_gain(frame.sensor, gain)
@@ -228,9 +230,9 @@ def kept_exposures(
 
 
 def colours_under(sensor: SensorConfig, processor: Processor, spectrum: Spectrum) -> ColourFit:
-    """Fit a processor's colours under a light, in bands of its own: calibration doesn't depend on the render.
+    """Fit a processor's colours under a light, in bands that don't depend on the render.
 
-    The bands go on as far as the sensor's window does: a camera is calibrated with the infrared that it sees.
+    The bands reach as far as the sensor's window does, so that a camera is calibrated with the infrared that it sees.
     """
     nm: Floats = np.arange(DEFAULT_WAVELENGTH_NM[0], max(sensor.window_nm[1], VISIBLE_NM[1]), 10.0)
     return colour_fit(sensor, processor, light_in_bands(spectrum, nm, band_widths(nm)))

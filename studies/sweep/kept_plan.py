@@ -1,4 +1,4 @@
-"""A study's plan, kept beside its pilots, so that a sweep that goes on doesn't compute it again."""
+"""Store a study's plan beside its pilot renders, so that a sweep that is continued doesn't compute the plan again."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -50,7 +50,7 @@ def _key(study: Study) -> str:
 
 
 def _facts(study: Study, plan: Plan) -> dict[str, Any]:
-    """Return a plan by the places of its scenes and conditions in the study."""
+    """Return a plan as JSON holds it, with the numbers of scenes and conditions in the study for their names."""
     places = {condition: place for place, condition in enumerate(conditions(study))}
     return {
         "renders": [asdict(plan.renders[scene]) if scene in plan.renders else None for scene in study.scenes],

@@ -1,4 +1,4 @@
-"""A scene of a study that moves: its light at each time, and what each exposure takes of them."""
+"""The light of a scene that moves: a render at each of several times, and their average over an exposure."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -15,8 +15,8 @@ from studies.study.lit_scene import OpenedScene, make_transport
 from studies.study.model import RenderModel
 from studies.study.study import SPP, Study
 
-_MOMENT = 0x7473  # makes the paths of the times differ from the middle's
-_LEAST_SHARE = 1e-9  # share of a row at or below which a time doesn't count, because it is rounding
+_MOMENT = 0x7473  # part of the seeds at the times, so that the render at the middle has other random paths
+_LEAST_SHARE = 1e-9  # a time with this share of a row's exposure or less doesn't count, because that is rounding
 
 
 @dataclass(frozen=True)
@@ -66,9 +66,9 @@ class MovingLight:
         return digest(found), seconds
 
     def exposed(self, sensor: SensorConfig, exposure_s: float, middle: Transport) -> Transport:
-        """Average the light that an exposure of a sensor takes, each row by its own shares; the level is the middle's.
+        """Average the light over an exposure of a sensor, for each row with its own shares of the times.
 
-        Only those times are read of which some row takes a share.
+        The average has the level of the render at the middle. Times that no row's exposure reaches aren't read.
         """
         opened, samples = self.opened, self.samples
         shares = centred_shares(sensor, opened.size[0], exposure_s, opened.whole_s, len(opened.moving))

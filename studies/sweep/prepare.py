@@ -1,4 +1,4 @@
-"""From a study to its cells: one render a scene, the files that its cells share, and a cell for every combination."""
+"""Prepare a study's cells: a render per scene, the files that a scene's cells share, and a cell per combination."""
 
 import sqlite3
 import warnings
@@ -56,7 +56,7 @@ FELL_BACK = ("Neither LLVM nor CUDA answered: captures and the reconstruction ra
 
 @dataclass(frozen=True)
 class Job:
-    """Study that is swept, with its plan, the folder and results database that it goes to, and the clock of the run."""
+    """Study that is swept, with its plan, the folder and database of its results, and the clock of the run."""
 
     study: Study
     plan: Plan
@@ -144,9 +144,9 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
 
 
 def make_scene(job: Job, opened: OpenedScene, clock: StageClock, progress: Progress) -> tuple[RenderRecord, list[Cell]]:
-    """Render a scene, make the files that its cells share, and give its record and its cells in the study's order.
+    """Render a scene and make the files that its cells share; return the render's record and the cells in order.
 
-    The results database isn't touched, so that another thread may do this; `note_scene` then notes it.
+    Another thread may call this, because it doesn't touch the results database; `note_scene` stores the record there.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def make_scene(job: Job, opened: OpenedScene, clock: StageClock, progress: Progr
             transport, assumed = moments.middle(part_of(progress, 0, 2))
             content, seconds = moments.content(transport, part_of(progress, 1, 2))
     with clock.stage("what cells share"), warnings.catch_warnings():
-        if job.plan.ledgers:  # the plan's ledgers charge the error within bands
+        if job.plan.ledgers:  # the plan's ledgers include the error of wide bands already
             warnings.simplefilter("ignore", WideBandsWarning)
         facts = render_facts(transport, photographed(transport, 1.0))
         if moments is None:
@@ -187,12 +187,12 @@ def make_scene(job: Job, opened: OpenedScene, clock: StageClock, progress: Progr
 
 
 def note_scene(job: Job, opened: OpenedScene, record: RenderRecord) -> None:
-    """Note in the results database that the files of a scene are there."""
+    """Store a render's record in the results database, which marks the scene's files as made."""
     note_render(job.base, _request(job, opened), record)
 
 
 def scene_transport(job: Job, opened: OpenedScene, progress: Progress) -> tuple[Transport, tuple[str, ...]]:
-    """Return a scene's transport, rendered or from the folder of renders, and what was assumed about a file."""
+    """Return a scene's transport, rendered now or before, and notes on what was assumed about a picture file."""
     model = job.plan.renders.get(opened.choice)
     share = partial(_brightest_share, job, opened)
     samples = job.plan.samples_a_side(opened.choice)
@@ -200,7 +200,7 @@ def scene_transport(job: Job, opened: OpenedScene, progress: Progress) -> tuple[
 
 
 def _moments(job: Job, opened: OpenedScene) -> MovingLight | None:
-    """Return the light of a scene that moves; None of one that stands still."""
+    """Return the light of a scene that moves; None for a scene that stands still."""
     if not opened.moving:
         return None
     samples = job.plan.samples_a_side(opened.choice)
@@ -236,9 +236,9 @@ def _request(job: Job, opened: OpenedScene) -> str:
 
 
 def _imaged(job: Job, opened: OpenedScene) -> dict[Imaged, Sensors]:
-    """Return for each frame of a scene its preset, and its sensor with the lens as it is modelled.
+    """Return for each frame of a scene its preset, and the sensor with its mosaic and with the lens that is modelled.
 
-    Levels, exposures and seeds share a frame.
+    Levels and seeds share a frame, and so do exposures unless the scene moves.
     """
     sensors = {}
     view_deg = None if opened.scene is None else horizontal_view_deg(opened.scene.geometry["sensor"], opened.size)
@@ -256,7 +256,7 @@ def _imaged(job: Job, opened: OpenedScene) -> dict[Imaged, Sensors]:
 def _make_files(
     job: Job, opened: OpenedScene, record: RenderRecord, transport: Transport, moments: MovingLight | None
 ) -> None:
-    """Make those files that the scene's cells share and that are missing, for a scene that moves one per exposure."""
+    """Make the missing ones of the files that a scene's cells share; a scene that moves has some for each exposure."""
     folder = job.out / FRAMES
     folder.mkdir(parents=True, exist_ok=True)
     samples = job.plan.samples_a_side(opened.choice)

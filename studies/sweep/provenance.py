@@ -31,7 +31,7 @@ _IMPORTS = re.compile(
 def code_version(root: Path = ROOT, names: Sequence[str] = _DECIDING) -> str:
     """Return rodcone's version and a hash of the sources that decide a picture.
 
-    With `names`, the sources of `studies` are those of other modules and of what they import.
+    `names` are the modules of `studies` whose sources count, together with those of the modules that they import.
     """
     files = [path for name in _WHOLE for path in (root / name).rglob("*") if path.suffix in _CODE]
     files += deciding_modules(root, names)
@@ -42,7 +42,7 @@ def code_version(root: Path = ROOT, names: Sequence[str] = _DECIDING) -> str:
 def deciding_modules(root: Path = ROOT, names: Sequence[str] = _DECIDING) -> list[Path]:
     """Return the files of the named modules of `studies`, and of all modules of `studies` that these import.
 
-    By default they are the modules that decide a picture.
+    The default names are those of the modules that decide a picture.
     """
     paths = set[Path]()
     waiting = list(names)
@@ -85,8 +85,8 @@ def provenance(
 ) -> Provenance:
     """Return the provenance of a cell that is made in this process; `exact` is as in `studies.study.model.ImageModel`.
 
-    `user_versions` names the version of a user's own processor (`isp.processors.own.own_version`). What the processor's
-    file imports isn't in it.
+    `user_versions` holds the version of a user's own processor (`isp.processors.own.own_version`), which doesn't cover
+    modules that the processor's file imports.
     """
     return Provenance(
         variant=variant,
@@ -108,7 +108,7 @@ def versions(processor: str | None = None) -> dict[str, str]:
 
 @cache
 def _own_code() -> str:
-    """Return `code_version` as it is when this process first asks."""
+    """Return `code_version`, computed once per process."""
     return code_version()
 
 
@@ -118,7 +118,7 @@ def threads() -> int:
 
 
 def in_words(made_by: Provenance) -> dict[str, str]:
-    """Return the variant, engines and versions by names for a reader."""
+    """Return the variant, engines and versions, each under a name for a reader."""
     return {
         "Mitsuba variant": made_by.variant,
         "engine of captures": made_by.readout_engine,
@@ -128,9 +128,9 @@ def in_words(made_by: Provenance) -> dict[str, str]:
 
 
 def require_same(stated: Provenance, processor: str, on_backend: bool, user_versions: Mapping[str, str]) -> None:
-    """Raise `InputError` where this process has other code, versions or engines than the sweep that a cell is of.
+    """Raise `InputError` if this process has other code, versions or engines than `stated`, those of a cell's sweep.
 
-    Parameters are as `provenance` takes them.
+    The other parameters are as in `provenance`.
     """
     exact = stated.readout_engine == "numpy"
     local = in_words(provenance(stated.variant, processor, on_backend, user_versions, exact))
@@ -148,10 +148,10 @@ def made_by(row: Row) -> Provenance:
 
 
 def require_alike(rows: Sequence[Row]) -> None:
-    """Raise `InputError` where a mean or a comparison would be over different versions, variants or engines.
+    """Raise `InputError` if rows were made by different versions, variants or engines, so that no mean is allowed.
 
-    A scene has one variant, a condition one engine of captures, a processor one of development, and a package one
-    version.
+    All rows must have the same version of each package, those of a scene the same variant, those of a condition the
+    same engine of captures, and those of a processor the same engine of development.
     """
     values: dict[tuple[object, ...], str] = {}
     for row in rows:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Row:
-    """Content of the results database for one cell. Repeated runs change only times and the columns of their makers.
+    """Content of the results database for one cell. A repeated run changes only the columns on time and machine.
 
     Attributes
     ----------
@@ -16,10 +16,9 @@ class Row:
     luminance_cd_m2, illuminance_lux, exposure_s : float
         The level in both units (lux where the scene states a plane), and the time of one frame.
     gain_factor, iso : float
-        Gain that the frame was read with, and the speed that it gives; no speed of a mosaic without green.
+        Gain with which the frame was read, and the camera's speed at that gain, None for a mosaic without green.
     spp : float
-        Samples per pixel of the render, in the mean; where the render is finer than the sensor's pixels (an edge's),
-        per pixel of the render.
+        Mean samples per pixel of the render. For an edge the render's pixels are finer than the sensor's.
     bands : int
         Number of bands of the render.
     render : str
@@ -35,7 +34,7 @@ class Row:
     mtf50_cy_per_px, chart_delta_e_mean, patch_snr_db : float or None
         As in `studies.metrics.target_figures.TargetFigures`.
     mc_share : float
-        Monte Carlo variance over the sensor's own, means over the pixels below saturation.
+        Monte Carlo variance over the sensor's own noise variance, both as means over the pixels below saturation.
     snr_db : float or None
         SNR of green [dB], where the processor measures it.
     substitution : int or None
@@ -43,13 +42,13 @@ class Row:
     saturated : float
         Share of saturated pixels.
     balance_delta_e : float or None
-        CIEDE2000 between a neutral grey of 18 % under the scene's light and a noise-free frame of it, developed with
-        the exposure's white balance: 0 as shot, and what Gray World misses the light by; None for a processor that
-        states no balance.
+        CIEDE2000 between a neutral grey of 18 % and a noise-free frame of it under the scene's light that is developed
+        with the exposure's white balance. It is 0 as shot; for Gray World it says how far its balance is off. None for
+        a processor that states no balance.
     balance, mean_electrons : str
         Balance and mean electrons by channel, as JSON.
     variant, readout_engine, development_engine, versions : str
-        As in `studies.sweep.provenance.Provenance`; the engines are those that raw image and picture state.
+        As in `studies.sweep.provenance.Provenance`; the engines are those that the raw image and the picture name.
     picture, truth : str
         Files of the developed and the noise-free picture below the folder of pictures.
     render_s : float
@@ -63,9 +62,10 @@ class Row:
     finished : str
         UTC.
     host, machine : str
-        Name, and processor, operating system and Python: the same cell on another has last bits of its own.
+        The computer's name; and its processor, operating system and Python. On another machine the same cell may differ
+        in the last bits of its figures.
     worker : int
-        Number of the thread that ran the cell, as the host counts them.
+        Number that the host's operating system gives to the thread that ran the cell.
     """
 
     key: str

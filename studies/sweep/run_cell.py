@@ -44,8 +44,8 @@ def run_cell(cell: Cell) -> Row:
     Raises
     ------
     InputError
-        Where this process has other code, versions or engines than the one that asks, or can't read the arrays by
-        their paths.
+        If this process has other code, versions or engines than the one that runs the sweep, or can't read the arrays
+        by their paths.
     OSError
         Where the picture can't be written.
     """
@@ -53,12 +53,13 @@ def run_cell(cell: Cell) -> Row:
     require_same(cell.made_by, cell.processor, processor.on_backend, processor.file_version)
     frame, sensor, engine = cell.frame, cell.frame.sensor, cell.made_by.readout_engine
     stated = stated_columns(cell)
-    # Expose: the frame's electrons are those at 1 cd/m^2 and 1 s.
+    # Expose. The frame's electrons are those at 1 cd/m^2 and 1 s, which are multiplied by `light`.
     light = cell.luminance_cd_m2 * cell.exposure_s
     electrons, true_linear, errors = (read_array(path) for path in (frame.electrons, frame.truth, frame.errors))
     unmoved_e = np.asarray(electrons, dtype=np.float64) * light
     expected_e = behind_filters(unmoved_e, sensor) if sensor.lens.shake_um else unmoved_e
-    # A truth in photodiodes is binned as the sensor bins. With `sensor_side_um` it has the coarsest sensor's pixels.
+    # If the truth has a pixel per photodiode, it is binned as the sensor bins. With `sensor_side_um` it already has the
+    # pixels of the coarsest sensor.
     bins_truth = sensor.sites > 1 and true_linear.shape[:2] == expected_e.shape
     truth, truth_png = _true_picture(frame.truth, bins_truth)
     pixels_e = sensor.pixel_sums(expected_e)
@@ -83,14 +84,15 @@ def run_cell(cell: Cell) -> Row:
     raw, capture_s, first_capture_s = timed(burst, *("capture", engine, stated["sensor"], shape, frames))
     # Develop to linear sRGB in which white is 1.
     saturated = raw.saturated
-    # The neutral of the scene's light, which a raw file would note, sets the scale, and as shot also the balance.
+    # The neutral of the scene's light, which a raw file would state, sets the picture's scale. If the white balance is
+    # as shot, the neutral sets that too.
     neutral = neutral_electrons(sensor, frame.light, raw.exposure_s)
     options = {"balance": neutral} if stated["white_balance"] == AS_SHOT else {}
     (linear, picture), develop_s, first_develop_s = timed(
         lambda: develop_to_scale(raw, processor, cell.fit, sensor, neutral, cell.white_cd_m2, **options),
-        *("develop", cell.processor, shape, bool(saturated.any()), bool(saturated.all())),  # they choose kernels
+        *("develop", cell.processor, shape, bool(saturated.any()), bool(saturated.all())),  # these decide the kernels
     )
-    if linear.shape != truth.linear.shape:  # sensors of one size are compared in the coarsest's pixels
+    if linear.shape != truth.linear.shape:  # sensors of one size are compared in the pixels of the coarsest
         linear = area_average(linear, truth.linear.shape[:2])
     encoded = encode_srgb(linear)
     # Measure.

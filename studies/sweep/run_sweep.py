@@ -58,9 +58,10 @@ MARKER = ".rodcone-sweep"  # file that each sweep at work locks; the lock ends w
 
 @contextmanager
 def locked_folder(out: Path) -> Iterator[None]:
-    """Mark a folder as one of sweeps, and lock it; if no other sweep locks it, remove files that are half-written.
+    """Mark a folder as a sweep's and lock it within the ``with`` block; several sweeps may share the lock.
 
-    A new or an empty folder is marked; hidden files don't count.
+    If no other sweep is at work in it, files that an earlier run left half-written are removed first. The folder may be
+    new, hold a sweep, or hold nothing but hidden files.
 
     Raises
     ------
@@ -100,8 +101,8 @@ def _remove_half_written(out: Path) -> None:
 
 # Runs cells and yields their rows, as `partial(studies.sweep.workers.run_in_processes, workers=4)` does.
 Runner = Callable[[Sequence[Cell]], Generator[Row, None, None]]
-NOTE_S = 1.0  # seconds of a run that a kill may lose; noting them with every row would cost a write each
-RENDER_SHARE = 0.5  # share of the progress bar for a scene's render, whose time isn't known before
+NOTE_S = 1.0  # seconds between two notes of the time taken so far, because a note with every row would cost a write
+RENDER_SHARE = 0.5  # part of a scene's progress that its render counts for; its real part of the time isn't known
 
 
 @dataclass(frozen=True)
@@ -148,10 +149,10 @@ def sweep(
     out : str or Path
         Folder; made where it isn't there.
     plan : Plan, optional
-        Of `studies.budget.plan.plan` or of `studies.budget.starting_points`; left out, of `plan`, whose pilots stay in
-        the folder.
+        What each picture models, as `studies.budget.plan.plan` or `studies.budget.starting_points` decides it; left
+        out, `plan` decides it, and its pilot renders stay in the folder.
     runner : callable, optional
-        Function of cells that yields rows as they come; left out, cells are made in this process.
+        Function that takes cells, and yields a row when a cell is made; left out, cells are made in this process.
     step : callable, optional
         Function that is called with what is being done and the share that is done; left out, a notebook shows a bar.
     clock : Clock, optional
@@ -201,7 +202,7 @@ def sweep(
 
 
 def _noise_notes(worst: Iterable[Row]) -> list[str]:
-    """Write a note for each scene where the render's noise exceeds a sensor's, about the row where it does so most."""
+    """Write a note for each scene whose render's noise shows beside a sensor's, about the row where it shows most."""
     notes = [(row, noise_note(row.mc_share, row.spp)) for row in worst]
     return [f"{row.scene}, {row.level}, {row.sensor}, {row.processor}: {note}" for row, note in notes if note]
 
@@ -242,7 +243,7 @@ def _scenes(
 
 
 class Shares:
-    """Progress of a sweep: the mean over all scenes of the shares of render and cells that are done."""
+    """Progress of a sweep: the mean over all scenes of the share of each scene, render and cells, that is done."""
 
     def __init__(self, step: Step, count: int) -> None:
         self._step, self._count = step, count
@@ -264,7 +265,10 @@ class Shares:
 
 @contextmanager
 def noting_stages(job: Job, run: int, more: Mapping[str, float]) -> Iterator[None]:
-    """Note the seconds so far when the cells of a scene end, in whatever way; `more` adds to those of the clock."""
+    """Store the run's seconds by stage at the end of the ``with`` block, also after an error.
+
+    `more` holds seconds by stage that are added to those of the run's clock.
+    """
     try:
         yield
     finally:
@@ -286,7 +290,7 @@ def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step
             seconds[f"develop {row.processor}"] += row.develop_s or 0.0
             seconds["metrics"] += row.measure_s or 0.0
             seconds[FIRST] += row.first_s
-            # Divided to wall time, because the workers work at the same time.
+            # The workers work at the same time, so their seconds are divided by their number, which gives wall time.
             on_the_clock.update((name, value / len(workers)) for name, value in seconds.items())
             if time.monotonic() - noted_s >= NOTE_S:
                 noted_s = time.monotonic()

@@ -1,6 +1,7 @@
-"""Files named by the digest of their content: how a sweep keeps arrays and pictures, and notices damage on reading.
+"""Files named by the digest of their content, in which a sweep keeps arrays and pictures; a reader notices damage.
 
-Against accidents, not intent: bit rot, files cut short, runs that were killed.
+The digest reveals accidents, such as bit rot, files cut short and runs that were killed. It is no protection against
+intent.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Cells on any executor, and on a pool of processes that is made anew when one of them dies."""
+"""Run cells on any executor, or on a pool of processes that is made anew when one of them dies."""
 
 import multiprocessing
 import os
@@ -22,7 +22,7 @@ from studies.sweep.run_cell import run_cell
 
 MOST_WORKERS = 1024
 LEAVE_S = 10.0  # time for an idle worker to end, while libraries release threads and memory
-MOST_DEATHS = 3  # a cell is given up after so many workers died while they held it; the last two ran it alone
+MOST_DEATHS = 3  # a cell is given up after this many workers have died with it, two of them while it ran alone
 # Variables that BLAS libraries and OpenMP read when they are imported; they are set before a worker starts.
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 # The settings to which glibc adapts once 32 MB were freed at once. Arrays of a small frame are just larger than its
@@ -35,7 +35,8 @@ _QUIET_TRACKER = "ignore:resource_tracker:UserWarning"
 class Task(Protocol):
     """Work whose result a worker makes: a cell of a sweep, or a shard of a data set.
 
-    Tasks of one kind share what their maker prepares; the result of each has its key.
+    What a worker has prepared for one task serves all tasks of the same kind, such as cells that differ only in their
+    seed.
     """
 
     @property
@@ -44,11 +45,11 @@ class Task(Protocol):
 
     @property
     def kind(self) -> tuple[object, ...]:
-        """Return what a task shares with others of its kind; messages name the kind by it."""
+        """Return the values that all tasks of this kind have in common; messages name the kind by them."""
 
 
 class WorkerLostError(RuntimeError):
-    """Error because a worker died while the executor had `cells`."""
+    """Error that is raised when a worker dies; `cells` are those that the executor had then."""
 
     def __init__(self, cells: Sequence[Task]) -> None:
         super().__init__("a worker died")
@@ -76,9 +77,10 @@ def run(
     threads: int | None = None,
     make: Callable[..., Any] = run_cell,
 ) -> Generator[Any, None, None]:
-    """Run cells on an executor and give their rows as they come, in no order.
+    """Run cells on an executor, and yield their rows in the order in which they are finished.
 
-    After Ctrl-C no further cell is started; the rows of those that run are still given, then it is raised.
+    After Ctrl-C no further cell is started. The rows of cells that run are still yielded, then `KeyboardInterrupt` is
+    raised.
 
     Parameters
     ----------
@@ -86,19 +88,19 @@ def run(
     executor : concurrent.futures.Executor
         Any whose calls may travel as pickles: a pool, `InThisProcess`, `dask.distributed.Client.get_executor()`.
     at_once : int
-        Cells in the executor's hands: as many as it has workers, for each to make the cells of a condition one after
-        the other; twice as many where a worker would wait long for the next.
+        Most cells that the executor has at one time. If it is the number of workers, each worker makes the cells of one
+        condition one after the other. Twice that number helps if a worker would wait long for its next cell.
     threads : int, optional
         Threads of Dr.Jit in each worker.
     make : callable
-        Makes the result of a task; of a cell its row.
+        Function that makes the result of a task, such as a cell's row.
 
     Raises
     ------
     InputError, OSError
         As `studies.sweep.run_cell.run_cell`.
     WorkerLostError
-        Where the executor broke; rows that were ready have been given.
+        If the executor broke; rows that were ready have been yielded.
     """
     call = partial(_made, make, threads)
     waiting = dict[Hashable, deque[Task]]()
@@ -155,7 +157,7 @@ def _take(waiting: dict[Hashable, deque[Task]], running: Iterable[Task]) -> Task
 
 
 def _finished(running: dict[Future[Any], Task]) -> Iterator[Any]:
-    """Wait for the cells that finish next and yield their rows; raise an error among them after the rows."""
+    """Wait for the cells that finish next, and yield their rows; an error of one of them is raised after the rows."""
     ready, _ = wait(running, return_when=FIRST_COMPLETED)
     for future in [future for future in ready if future.exception() is None]:
         del running[future]
@@ -172,9 +174,9 @@ def run_in_processes(
 ) -> Generator[Any, None, None]:
     """Run cells on spawned processes; if one of them dies, make the pool anew.
 
-    The cells that a broken pool had taken are run again, after all others and one by one: if memory was short each of
-    them now has all of it, and the cell that kills its worker is told apart from the others. Dr.Jit, BLAS and OpenMP
-    get cores / workers threads in each process.
+    The cells that a broken pool had taken are run again, after all others and one by one. If memory was short, each of
+    them now has all of it, and it becomes clear which cell kills its worker. Dr.Jit, BLAS and OpenMP get
+    cores / workers threads in each process.
 
     Raises
     ------
