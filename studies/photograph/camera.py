@@ -1,4 +1,4 @@
-"""A camera's colours, calibrated on the ColorChecker; its notes beside a frame; development to the truth's scale."""
+"""Photograph and develop: colours calibrated on the ColorChecker, a frame's notes, pictures in the truth's scale."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -42,9 +42,9 @@ from sensor.shake import held_lens
 from studies.metrics.truth import GREY, Light, light_in_bands, lit_range, neutral_electrons
 from studies.study.gain import at_gain, gain_text, iso_speed
 
-LEAST_COLOUR = 1e-5  # least colour in the weaker of two directions, as a share of the signals; less is rounding
+LEAST_COLOUR = 1e-5  # differences between balanced channels below this share of the signals are rounding, not colour
 BAND_NM = 10.0  # width of the bands of calibration [nm]
-GREY_COLOUR = 0.01  # share of the channels' differences that stays, under a light that shows no colours
+GREY_COLOUR = 0.01  # under a light that shows no colours, the matrix keeps this share of the channels' differences
 
 
 def calibrate(sensor: SensorConfig, light: Spectrum) -> ColourCalibration:
@@ -53,15 +53,16 @@ def calibrate(sensor: SensorConfig, light: Spectrum) -> ColourCalibration:
     Parameters
     ----------
     sensor : SensorConfig
-        The first three channels of its mosaic, R, G and B where it has them, tell colours. Channels beyond these get a
-        fitted column from XYZ, and carry no colour back. One or two channels give grey.
+        The first three channels of its mosaic, R, G and B where it has them, give the colours. Further channels, such
+        as W, are fitted to XYZ, but nothing is computed back from them. One or two channels give grey.
     light : Spectrum
         Light that the camera's white balance is set to.
 
     Raises
     ------
     InputError
-        Where a channel collects nothing, or the three can't tell colours apart.
+        For a channel that collects nothing, or three channels that can't tell colours apart under any light. If only
+        the given light shows no colours, as sodium's lines don't, the result is nearly grey.
 
     Examples
     --------
@@ -88,7 +89,7 @@ def _in_bands(spectrum: Spectrum, window_nm: tuple[float, float]) -> Light:
 
 
 def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return the neutral, the matrix to sRGB, that from XYZ and that to XYZ (D50), all under one light."""
+    """Return a camera's neutral and its matrices to sRGB, from XYZ, and to XYZ (D50), all under one light."""
     light = _in_bands(spectrum, sensor.window_nm)
     nm, width = light.wavelength_nm, light.width_nm
     behind_filters_e = electrons_per_irradiance(sensor, nm, width, 1.0, light.lamp)
@@ -127,8 +128,8 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
 
     from_srgb = rows_from_srgb(electrons, to_srgb)
     if sensor.pixel.crosstalk and len(names) > 3:
-        # These rows are for the light behind each filter and are then mixed as the channels are: they say how much of
-        # W's charge to subtract from its neighbours.
+        # These rows give the light behind each filter, which is then mixed as crosstalk mixes the channels. So they
+        # say how much of W's charge is in its neighbours, and has to be subtracted from them.
         plain = (surfaces * light.spectrum) @ behind_filters_e[three].T / (behind_filters_e[three] @ light.spectrum)
         from_srgb = mixing * (behind_filters_e @ light.spectrum) / collected[:, None]
         from_srgb = from_srgb @ rows_from_srgb(behind_filters_e, fit_through_neutral(plain, colours))
@@ -141,13 +142,13 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
 
 
 def _tells_colours(signals: Floats) -> bool:
-    """Return whether balanced signals (patch, 3) differ among each other in two directions by more than rounding."""
+    """Return whether the balanced signals (patch, 3) hold colour in two directions, beyond rounding."""
     differences = signals[:, :2] - signals[:, 2:]
     return bool(np.linalg.svd(differences, compute_uv=False)[-1] > LEAST_COLOUR * np.linalg.norm(signals))
 
 
 def _nearly_grey(collected: Floats) -> Floats:
-    """Return the matrix from balanced R, G and B to their mean by electrons, with just enough colour for an inverse."""
+    """Return a matrix from balanced R, G and B to their mean, weighted by electrons, that still has an inverse."""
     return (1 - GREY_COLOUR) * np.tile(collected / collected.sum(), (3, 1)) + GREY_COLOUR * np.eye(3)
 
 
@@ -160,7 +161,7 @@ def colour_fit(sensor: SensorConfig, processor: Processor, light: Light) -> Colo
     """Fit the processor's colours and the mosaic's other channels under a light, on the ColorChecker's patches.
 
     The channels are those of the light behind each filter, because development undoes crosstalk first
-    (`isp.crosstalk`). Only if it doesn't are they the channels as they are read.
+    (`isp.crosstalk`). Where that doesn't undo it, they are the channels as they are read, with crosstalk.
     """
     nm, width = light.wavelength_nm, light.width_nm
     surfaces = np.array([held(reflectance).band_average(nm, width) for _, reflectance in color_checker_reflectances()])
@@ -182,10 +183,9 @@ def develop_to_scale(
     white_cd_m2: float,
     **options: Any,
 ) -> tuple[NDArray[np.float64], Picture]:
-    """Develop an exposure and bring it to the truth's scale by what the camera is known to collect.
+    """Develop an exposure, and scale it to the truth by the electrons that the camera is known to collect.
 
-    Nothing is taken from the noisy picture for the scale. The falloff that the sensor's lens is known to have is
-    corrected.
+    The noisy picture has no part in the scale. The falloff that the sensor's lens is known to have is corrected.
 
     Parameters
     ----------
@@ -193,11 +193,12 @@ def develop_to_scale(
     processor : Processor
         Processor as from `isp.processors.own.processor_of`.
     colours : ColourFit
-        Fit of the processor's balanced colours; the paper's literal camera has a (3, 3) matrix in its place.
+        Fit of the processor's balanced colours; for the camera exactly as the paper states it, a (3, 3) matrix.
     sensor : SensorConfig
         The sensor that took the exposure.
     neutral : (channel,) float64
-        `studies.metrics.truth.neutral_electrons` of the light and the exposure's time: 1 cd/m^2.
+        Electrons of a neutral surface of 1 cd/m^2 in the exposure time, as from
+        `studies.metrics.truth.neutral_electrons`.
     white_cd_m2 : float
         Luminance shown as white [cd m^-2].
     **options
@@ -208,7 +209,7 @@ def develop_to_scale(
     linear : (h, w, 3) float64
         Linear sRGB, in which `white_cd_m2` is 1; not clipped.
     picture : Picture
-        The processor's own result, in electrons of its unit's channel.
+        The processor's own result, in electrons of its unit channel.
 
     Raises
     ------
@@ -226,11 +227,11 @@ def develop_to_scale(
 def balance_delta_e(
     raw: RawImage, colours: ColourFit, sensor: SensorConfig, light: Light, balance: ArrayLike | None = None
 ) -> float:
-    """Return CIEDE2000 of a grey card after the white balance of an exposure, which measures how far that misses.
+    """Return how far the white balance of an exposure is off: CIEDE2000 of a grey card that is developed with it.
 
-    The card fills a noise-free frame of the sensor under the scene's light, with the charge that neighbours exchange,
-    and is developed with the exposure's gains. Its planes are bilinear and the colour matrix is that for no noise,
-    whatever the processor: the figure measures a balance, not a picture.
+    The card fills a noise-free frame of the sensor under the scene's light; its pixels exchange charge. It is
+    interpolated linearly and developed with the colour matrix for no noise, whatever the processor, because the figure
+    measures a balance, not a picture.
 
     Parameters
     ----------
@@ -243,7 +244,8 @@ def balance_delta_e(
     light : Light
         The light of the scene.
     balance : (channel,) array_like, optional
-        Response to what should come out neutral; left out, Gray World finds it in the exposure.
+        Each channel's response to a surface that is developed as neutral; left out, Gray World finds it in the
+        exposure.
     """
     neutral = neutral_electrons(sensor, light, 1.0)
     card, scale = _even_field(raw, sensor, light)
@@ -261,7 +263,7 @@ def balance_delta_e(
 
 
 def _even_field(raw: RawImage, sensor: SensorConfig, light: Light) -> tuple[RawImage, float]:
-    """Return a raw image of an even neutral field without noise, six tiles a side, and the scale of its electrons.
+    """Return a noise-free raw image of an even neutral field, six tiles wide and high, and the scale of its electrons.
 
     The scale is the ratio of its electrons to those that the field gives at 1 cd/m^2 in 1 s.
     """
@@ -367,9 +369,9 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
 def with_notes(
     raw: RawImage, sensor: SensorConfig, colour: ColourCalibration | None, source: str | Path = ""
 ) -> RawImage:
-    """Return the raw image with what a camera notes beside a frame: its name, f-number, ISO speed and colours.
+    """Return the raw image with what a camera states beside a frame: its name, f-number, ISO speed and colours.
 
-    The name is that of the preset's file `source`, if one is given.
+    `source` is the preset's file. If it is given, the camera's name is the file's without its ending.
     """
     name = Path(source).stem.encode("ascii", "replace").decode() or raw.camera
     return replace(raw, camera=name, f_number=sensor.lens.f_number, iso=iso_speed(sensor), colour=colour)

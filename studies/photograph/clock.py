@@ -1,4 +1,4 @@
-"""Seconds of a run by stages that add up, seconds of calls without what only the first does, and the machine."""
+"""Measure time: a run's seconds by stage, and calls apart from the first of their kind. Describe the machine."""
 
 import os
 import platform
@@ -23,7 +23,7 @@ def noting_times(note: Callable[[float, float], None]) -> Iterator[None]:
 
 
 class Clock:
-    """Seconds of each stage, and of what no stage holds."""
+    """Clock that adds up the seconds of each stage of a run, and knows those spent outside all stages."""
 
     def __init__(self) -> None:
         self._start = time.perf_counter()
@@ -38,14 +38,14 @@ class Clock:
         return noting_times(lambda start, end: self.add(name, end - start))
 
     def stages(self, more: Mapping[str, float] | None = None) -> dict[str, float]:
-        """Return the seconds by stage, `more` among them; `OTHER` is the rest of the time since the clock was made."""
+        """Return the seconds by stage, with `more` added; `OTHER` is the rest of the time since the clock was made."""
         seconds = dict(self._seconds)
         for name, value in (more or {}).items():
             seconds[name] = seconds.get(name, 0.0) + value
         return {**seconds, OTHER: time.perf_counter() - self._start - sum(seconds.values())}
 
 
-_CALLED = set[Hashable]()  # kinds of calls that this process has made already
+_CALLED = set[Hashable]()  # kinds of calls that `timed` has timed in this process
 
 
 def timed(call: Callable[[], Result], *kind: Hashable) -> tuple[Result, float | None, float]:
@@ -55,12 +55,13 @@ def timed(call: Callable[[], Result], *kind: Hashable) -> tuple[Result, float | 
     ----------
     call : callable
     *kind
-        All that a kernel is compiled for.
+        Values that decide which kernels the call needs; a call with other values is of another kind.
 
     Returns
     -------
     result, seconds, first_s
-        Seconds of the call, None for a first one; and the seconds of a first one, else 0.
+        Result of the call. `seconds` is the time of a later call, None for a first one; `first_s` is the time of a
+        first call, 0 for a later one.
     """
     start = time.perf_counter()
     result = call()
@@ -85,7 +86,7 @@ def machine() -> str:
 
 
 def processor_facts() -> dict[str, Any]:
-    """Return the processor, its cores, and how busy they are."""
+    """Return the processor's model, its number of cores, and how busy they were before the run."""
     facts: dict[str, Any] = {"processor": processor_name(), "cores": os.cpu_count()}
     if hasattr(os, "getloadavg"):
         facts["load before the run"] = round(os.getloadavg()[0], 1)

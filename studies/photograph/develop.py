@@ -26,14 +26,14 @@ from sensor.raw_files.raw_file import open_raw
 from studies.study.scene_source import asked_size
 from studies.study.study import AS_SHOT, WHITE_BALANCES, default_balance
 
-# Lights under which the matrices for A and D65 work as well as at these two temperatures: the presets' neutral is met
-# to 1 % in R, G and B and 6 % in W. Under lamps with emission bands B is up to 26 % off, and W by a factor of two.
+# Broad lights, whose neutral a raw file's matrices for A and D65 predict well: for the presets within 1 % in R, G and B
+# and within 6 % in W. Under lamps with emission bands B is up to 26 % off, and W by a factor of two.
 BROAD = ("A", "D50", "D55", "D65", "D75", "moonlight", "sunlight")
 
 
 @dataclass(frozen=True)
 class Developed:
-    """Encoded picture (h, w, 3) in [0, 1], and what was decided on the way, as JSON holds it."""
+    """Encoded picture (h, w, 3) in [0, 1], and facts for JSON: the raw file's, and the settings of its development."""
 
     encoded: NDArray[np.float64]
     facts: dict[str, Any]
@@ -89,7 +89,7 @@ def develop(
 
 
 def _asked_neutral(colour: ColourCalibration, white_balance: str) -> Floats | None:
-    """Return a neutral's response under the light that is asked for; None where Gray World finds it in the picture."""
+    """Return the camera's response to a neutral under the requested light; None if Gray World is to find it."""
     if white_balance in WHITE_BALANCES:
         return colour.neutral if white_balance == AS_SHOT else None
     try:
@@ -117,8 +117,8 @@ def develop_file(
 ) -> Developed:
     """Read a raw file and develop it with its own colour calibration.
 
-    The colour matrix is the file's, fitted under the light that its as-shot neutral stands for; of a camera's file,
-    LibRaw's for daylight.
+    The colour matrix is the file's own, fitted under the light of its as-shot neutral. For a file of a real camera it
+    is LibRaw's matrix for daylight.
 
     Parameters
     ----------
@@ -127,15 +127,16 @@ def develop_file(
     isp, trust_code
         As `processor` and `trust_code` in `develop`.
     ev : float, optional
-        Brightness in stops: at 0 green's full well is white. Left out, `sensor.raw_files.brightness.stops_to_white`, by
-        which the exposure's 99th percentile of luminance comes to 90 % of white; for looking, not for measuring.
+        Brightness in stops: at 0 green's full well is white. Left out, `sensor.raw_files.brightness.stops_to_white`
+        chooses it so that the exposure's 99th percentile of luminance is 90 % of white, which suits viewing, not
+        measuring.
     white_balance : str, optional
         As in `develop`.
     encoding : str
         Name in `isp.colour.encoding.ENCODINGS`.
     height, width : int, optional
-        Pixels of the picture, at most the raw file's, each the mean of the linear light on its area; one of them alone
-        keeps the proportions.
+        Size of the picture in pixels, at most the raw file's. Each pixel is the mean of the linear light on its area.
+        If only one of the two is given, the picture keeps its proportions.
 
     Raises
     ------
@@ -177,7 +178,7 @@ def develop_file(
 
 
 def _size(linear: NDArray[np.float64], height: int | None, width: int | None) -> tuple[int, int]:
-    """Return the picture's height and width as they are asked for; each of its pixels is the mean of its area."""
+    """Return the requested height and width of the picture; raise `InputError` if they exceed the raw file's."""
     raw_size = linear.shape[0], linear.shape[1]
     size = asked_size(raw_size, height, width)
     if size[0] > raw_size[0] or size[1] > raw_size[1]:

@@ -1,4 +1,4 @@
-"""Lamps of a scene that flicker: which they are by an order's texts, and the part of the light that each gives."""
+"""Lamps that flicker: read from texts which lamps of a scene do, and separate the light that they give."""
 
 from collections.abc import Collection, Mapping, Sequence
 
@@ -8,7 +8,7 @@ from render.transport import Transport
 from rodcone.errors import InputError, require_name
 from sensor.flicker.waveform import Waveform, waveform
 
-ALL = ""  # key that stands for every lamp, in place of a light group
+ALL = ""  # key for all lamps together, in place of a light group's name
 
 
 def flicker_of(texts: Sequence[str], groups: Collection[str]) -> dict[str, Waveform]:
@@ -43,9 +43,9 @@ def flicker_of(texts: Sequence[str], groups: Collection[str]) -> dict[str, Wavef
 def lamp_parts(
     transport: Transport, spectra: Mapping[str, Spectrum], level: Mapping[str, float], flicker: Mapping[str, Waveform]
 ) -> list[tuple[Waveform, SpectralRadiance | None]]:
-    """Return the light of each waveform's lamps alone, as bright as it is among all lamps; nothing is rendered.
+    """Return each waveform with the light of its lamps alone, as bright as among all lamps; nothing is rendered.
 
-    None stands for the whole light, where all lamps have one waveform.
+    If all lamps have one waveform, None takes the place of the light, which is then the whole.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ def rolling_moments(sensor: SensorConfig, rows: int, exposure_s: float, count: i
 
 
 def centred_shares(sensor: SensorConfig, rows: int, exposure_s: float, whole_s: float, count: int) -> Floats:
-    """Return each row's shares of the times of a longer exposure, in whose middle the row's own exposure lies.
+    """Return each row's shares of the times of a longer exposure, for a shorter one that lies in its middle.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def centred_shares(sensor: SensorConfig, rows: int, exposure_s: float, whole_s: 
 
 
 def _shares(starts_s: Floats, exposure_s: float, whole_s: float, count: int) -> Floats:
-    """Return by how much each of several moments counts for each exposure, shape (moment, exposure).
+    """Return the weight of each moment in the mean light of each exposure, shape (moment, exposure).
 
     The exposures start at `starts_s`. The moments are the middles of `count` equal parts of the time from 0 to
     `whole_s`. Between two moments the light is interpolated linearly, and before the first and after the last it is
@@ -78,7 +78,8 @@ def _shares(starts_s: Floats, exposure_s: float, whole_s: float, count: int) -> 
     step_s = whole_s / count
 
     def until(time_s: Floats) -> Floats:
-        # Integral from 0 of the weight of each time, a tent 2 steps wide; at both ends the weight stays at 1.
+        # Integral from time 0 of each moment's weight, which is a tent 2 steps wide; outside the first and the last
+        # moment the weight of that moment stays at 1.
         away = (time_s - times_s[:, None]) / step_s
         steps = np.clip(away, -1.0, 1.0)
         tent = 0.5 + steps - steps * np.abs(steps) / 2
@@ -142,7 +143,7 @@ def time_average(transports: Iterable[Transport]) -> Transport:
 
 
 def _average(transports: Iterable[Transport], shares: Floats | None) -> Transport:
-    """Return the mean of transports over times, which all count alike, or by their share for each row of the sensor."""
+    """Return the mean of transports over times. All times count alike if `shares` is None, else by (time, row)."""
     mean: Transport | None = None
     meters: list[Callable[[], Irradiance] | None] = []
     for each in transports:
@@ -154,7 +155,7 @@ def _average(transports: Iterable[Transport], shares: Floats | None) -> Transpor
         raise InputError("transports: none given; allowed: one or more; give those of the times of an exposure")
     if len(meters) == 1:
         return mean
-    if shares is not None:  # few of the samples count for a row that sees few of the times
+    if shares is not None:  # a row that sees few of the times has few of the samples
         fewer = len(meters) * (shares**2).sum(axis=0)
         counts = np.rint(mean.counts / fewer[:, None]).astype(mean.counts.dtype)
         error = mean.relative_mc_error * float(np.sqrt(fewer).mean())
@@ -163,9 +164,9 @@ def _average(transports: Iterable[Transport], shares: Floats | None) -> Transpor
 
 
 def _parts(shares: Floats | None, count: int) -> float | Floats:
-    """Return the shares of the first `count` times together, over the share of the last of them, shape (row, 1).
+    """Return each row's sum of the first `count` times' shares over its share of the last of these, shape (row, 1).
 
-    It is infinite where the last has no share. Where all times count alike, it is their number.
+    The ratio is infinite if the last share is 0. If all times count alike (`shares` is None), it is `count`.
     """
     if shares is None:
         return count
@@ -250,7 +251,7 @@ def _correlated(groups: tuple[int, int], covariance: Planes, variance: Planes) -
 
 
 def _meter(meters: Sequence[Callable[[], Irradiance]]) -> Callable[[], Irradiance]:
-    """Return the meter of the mean, which asks the meter of each time once."""
+    """Return a function that measures the mean irradiance over all times; it calls the meter of each time only once."""
 
     @cache
     def measured() -> Irradiance:

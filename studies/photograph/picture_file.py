@@ -1,8 +1,8 @@
-"""Pictures as files, by the ending of their name: PNG and TIFF of 8 or 16 bits a channel.
+"""Write pictures as PNG or TIFF files with 8 or 16 bits per channel; the file name's ending chooses.
 
-PNG is written here, since Pillow writes no RGB of 16 bits. What the numbers mean: for sRGB the chunk `sRGB`. For
-Display P3 both `cICP`, four numbers that say it exactly and that programs of PNG's third edition (W3C, 2025) put first,
-and `iCCP`, a profile that older ones read (ICC.1:2022, version 4.4).
+PNG is written here, because Pillow writes no RGB with 16 bits. A PNG in sRGB says so in its chunk `sRGB`. One in
+Display P3 says so twice: in `cICP`, four numbers that programs of PNG's third edition (W3C, 2025) read first, and in
+`iCCP`, a profile that older programs read (ICC.1:2022, version 4.4).
 """
 
 import struct
@@ -24,7 +24,7 @@ DATA = Path(__file__).parents[1] / "data"
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _SOFTWARE = b"Software\0rodcone"
 _RGB, _PERCEPTUAL, _UP = 2, 0, 2  # colour type RGB, sRGB's rendering intent, filter: difference from the row above
-# Primaries of P3 with D65, transfer function of sRGB, R G B as they are, full range: ITU-T H.273, tables 2 to 4.
+# Primaries of P3 with D65, transfer function of sRGB, R G B without a matrix, full range: ITU-T H.273, tables 2 to 4.
 _P3_CODES = bytes([12, 13, 0, 1])
 
 
@@ -91,11 +91,12 @@ def write_picture(
     Parameters
     ----------
     picture : Picture, ReferencePicture, or (h, w, 3) or (h, w) array
-        The first two are linear and encode themselves. An array is one that is encoded, 0 black and 1 white.
+        A `Picture` or `ReferencePicture` is linear, and is encoded here. An array must be encoded already, with 0 for
+        black and 1 for white.
     path : path
         Ends in ``.png``, ``.tif`` or ``.tiff``.
     bits : int
-        8 or 16 a channel.
+        8 or 16 bits per channel.
     encoding : str
         Name in `isp.colour.encoding.ENCODINGS`; for an array, the encoding that it has.
 

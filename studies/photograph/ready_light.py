@@ -1,7 +1,8 @@
-"""Light of a scene that was rendered before, where a command would render the same: quiet, and at once.
+"""Find light of a scene that was rendered before, with little noise, so that a command needs no render of its own.
 
-A scene that the project ships light of is photographed by it at the light's own size, unless samples are asked for, or
-a size that it doesn't fit. Studies have a rule of their own (`render.reference`), which tests the file by a render too.
+The project ships such light for some scenes. A command uses it at its own size, unless the user asks for a number of
+samples or for a size that the light doesn't fit. Studies have a rule of their own (`render.reference`), which also
+checks the light against a render.
 """
 
 from collections.abc import Iterable
@@ -22,7 +23,7 @@ SIDE = 512  # longer side of the light that is shipped [pixels]
 
 @dataclass(frozen=True)
 class Ready:
-    """Light that is there, its size, and a line that says what it is."""
+    """Light that was rendered before, its size, and a line that says what it is."""
 
     transport: Transport
     size: tuple[int, int]
@@ -36,23 +37,25 @@ def find_ready(
     spectra: Iterable[Spectrum],
     bands: tuple[Floats, Floats] = BANDS,
 ) -> Ready | None:
-    """Find a scene's light that is there already, at the size asked for, else at its own size; None where none fits.
+    """Find light of a scene that was rendered before; return None if none fits.
+
+    Without a requested size, light whose longer side is `SIDE` is tried first, then the scene's own size.
 
     Parameters
     ----------
     scene : Scene
     own : (int, int)
-        Height and width that the scene has by itself.
+        Height and width of the scene's own film.
     asked : (int, int) or None
-        Height and width asked for.
+        Requested height and width; None for those of the light.
     spectra : iterable of Spectrum
-        Spectra of the lights. A lamp with lines needs bands of its own, so that no stored light fits it.
+        Spectra of the lights. A lamp with lines needs bands of its own, so no stored light fits it.
     bands : (array, array)
         Centres and widths [nm].
     """
     if any(emission_lines_nm(spectrum).size for spectrum in spectra):
         return None
-    larger = [film_size(own, SIDE)] if max(own) == OWN_SIDE else []  # the film of a file states its size
+    larger = [film_size(own, SIDE)] if max(own) == OWN_SIDE else []  # a scene file states a film size, which is kept
     for size in [asked] if asked else [*larger, own]:
         film = Film(size, *bands, max_depth=scene.max_depth, rr_depth=scene.rr_depth)
         if reference := ready_light(scene, film):
@@ -61,7 +64,7 @@ def find_ready(
 
 
 def load_ready(name: str, size: tuple[int, int] | int | None = None) -> Transport:
-    """Load light of a scene of the catalogue that is there already, at the size asked for or at the light's own.
+    """Load light of a scene of the catalogue that was rendered before, at the requested size or at the light's own.
 
     Raises
     ------

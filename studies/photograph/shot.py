@@ -1,4 +1,4 @@
-"""One photograph as raw files: a scene or a stored radiance in, digital negatives out."""
+"""Take one photograph of a scene or of a stored radiance, and write it as raw files."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -76,10 +76,10 @@ _LAMPS_IN_VIEW = 1.1  # ratio of the picture's mean luminance to the level above
 _SPP = 64
 _FILE_ARRAYS = 2  # arrays of a file's light with all bands: the light, and its variance or its source
 _HALVES = 2  # arrays of a render's light: its mean, and half the difference of its halves
-_MOST_HELD_BYTES = 1 << 28  # largest of these arrays that is held; larger ones are read from files by band
+_MOST_HELD_BYTES = 1 << 28  # largest of these arrays that stays in memory; larger ones are read from files, by band
 _AFTER_S = 3.5e-7  # processor seconds per pixel and band to relight, image, expose and judge the noise
-# Second part of the seed: of the chip's patterns, of the exposure's noise, of the moment in the lamps' cycle at which
-# it starts, and of the light's paths at its later times.
+# Second part of the seed of each random stream: the chip's patterns, the exposure's noise, the moment in the lamps'
+# cycle at which the exposure starts, and the light's paths at its later times.
 _DEVICE, _FRAME, _START, _MOMENT = 0, 1, 2, 3
 _ALL_ROWS = (
     "flicker: all rows are exposed together, so that the lamps brighten or darken the whole frame; for bands state the "
@@ -209,7 +209,7 @@ class Order:
 
 @dataclass(frozen=True)
 class Taken:
-    """Paths of the files written, facts of the exposure as JSON holds them, and what had to be assumed."""
+    """Paths of the files written, facts about the exposure for JSON, and notes on what had to be assumed."""
 
     paths: tuple[Path, ...]
     facts: dict[str, Any]
@@ -229,11 +229,12 @@ class Checked:
     moving : tuple of Scene
         The scene at each time of the exposure; empty where it stands still.
     shares : (time, row) float64 or None
-        Share of each time in a row's exposure, where rows roll (`studies.photograph.moments.rolling_moments`).
+        Share of each time in the exposure of each row, for a scene that moves while rows roll; otherwise None
+        (`studies.photograph.moments.rolling_moments`).
     exposure_s : float or None
         Exposure time; None if a rule chooses it.
     ready : Ready or None
-        Light that is there already.
+        Light that was rendered before; None if the scene has to be rendered.
     samples : int
         Samples of the light along each side of a pixel.
     cost : PictureCost
@@ -254,7 +255,7 @@ class Checked:
 
 
 def take(order: Order, step: Step | None = None) -> Taken:
-    """Photograph and write; a negative that not every converter develops gets ``NAME_bayer.dng`` beside it.
+    """Take a photograph and write it; a negative that not every converter develops gets ``NAME_bayer.dng`` beside it.
 
     Parameters
     ----------
@@ -274,7 +275,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
 
 
 def carry_out(checked: Checked, step: Step | None = None) -> Taken:
-    """Photograph what was checked, and write it; parameters and errors are those of `take`."""
+    """Take the photograph of a checked order, and write it; `step` and errors are as in `take`."""
     with kept_beside(Path(checked.order.out)) as kept:
         return _taken(checked, step, kept)
 
@@ -310,8 +311,8 @@ class _Electrons:
     per_second_e : (h, w, channel) float64
         Electrons per second behind every filter.
     error_e, expected_e : (h, w) float64, or None
-        One draw of a render's error, and the mean, of the raw image's pixels in the exposure; None for a stored
-        picture.
+        For each pixel of the raw image, one draw of the render's error and the expected electrons, both in the whole
+        exposure; None for a stored picture.
     exposure_s : float
     sensor : SensorConfig
         The sensor at the gain that the exposure takes.
@@ -325,7 +326,7 @@ class _Electrons:
 
 
 def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
-    """Photograph and write as `carry_out`, with a folder for the render meanwhile."""
+    """Do what `carry_out` does, with `kept` as the folder for the render's files until the photograph is written."""
     order, samples = checked.order, checked.samples
     require_memory(checked.cost.memory, order.force)
     out = Path(order.out)
@@ -398,7 +399,7 @@ def _of_file(checked: Checked, balance: Spectrum | None) -> _Subject:
     light_name = order.light[0] if order.light else None
     light_of_file = light_name or (None if balance is None or is_reflectance(order.source) else order.white_balance)
     white = file_white(order.source, light_of_file)
-    white = white if light_name else replace(white, named=False)  # because a white balance doesn't name a lamp
+    white = white if light_name else replace(white, named=False)  # --white-balance doesn't name the lamp
     transport, notes = open_radiance_file(order.source, white)
     light = white.spectrum
     if is_reference(order.source):
@@ -409,7 +410,7 @@ def _of_file(checked: Checked, balance: Spectrum | None) -> _Subject:
 
 
 def _of_scene(checked: Checked, balance: Spectrum | None, step: Step | None, kept: Path) -> _Subject:
-    """Find the lights of a scene, which is rendered when its light is asked for."""
+    """Find the lights of a scene; the scene is rendered only when the result's `transport` is called."""
     order, opened, ready = checked.order, checked.opened, checked.ready
     assert opened is not None
     spectra = asked_spectra(opened.scene, order.light)
@@ -449,8 +450,8 @@ def _electrons(
     exposure_s, sensor = _exposure(checked, per_second_e)
     if checked.opened is None:
         return _Electrons(per_second_e, None, None, exposure_s, sensor)
-    # The render's error is half the difference of its halves, because the frame is their mean. Beside a lamp a lens
-    # that is sampled once per pixel undershoots below 0, where `form_image` gives no light.
+    # The render's error is half the difference of its halves, because the frame is their mean. Next to a lamp the image
+    # of a lens that is sampled once per pixel falls below 0; `form_image` replaces that by 0.
     expected_e = _mosaic(per_second_e, sensor) * exposure_s
     even_e = _mosaic(imaged_electrons(halves()[0], sensor, exposure_s, samples), sensor)
     error_e = np.where(expected_e > 0, even_e - expected_e, 0.0)
@@ -463,7 +464,7 @@ def _frames(
     radiance: SpectralRadiance | None,
     parts: Sequence[tuple[Waveform, SpectralRadiance | None]],
 ) -> list[RawImage]:
-    """Take the order's exposures. `parts` are those of `lamp_parts`; `radiance`, all lamps together, is then given."""
+    """Take the order's exposures. For lamps that flicker, `parts` come from `lamp_parts`, `radiance` is all light."""
     seed, frames = checked.order.seed, checked.order.frames
     sensor, exposure_s = lit.sensor, lit.exposure_s
     device = draw_device(sensor, lit.per_second_e.shape[:2], np.random.default_rng([seed, _DEVICE]))
@@ -549,12 +550,12 @@ def _mosaic(channels_e: NDArray[np.float64], sensor: SensorConfig) -> NDArray[np
 
 
 def check(order: Order) -> Checked:
-    """Open what is to be photographed, and say what it costs; nothing is rendered.
+    """Check an order, open its scene or picture, and estimate what the photograph costs; nothing is rendered.
 
     Raises
     ------
     InputError
-        For what can't be photographed.
+        For an order that can't be carried out.
     """
     # The camera.
     sensor = at_gain(preset(order.sensor, order.cfa), gain_text(order.gain, order.iso))
@@ -670,7 +671,7 @@ def _light_arrays(order: Order, sensor: SensorConfig, arrays: int) -> int | None
 
 
 def _after_s(sensor: SensorConfig) -> tuple[float, float]:
-    """Processor seconds of what follows the light: per pixel and band, and per band."""
+    """Return the processor seconds that the steps after the light take: per pixel and band, and per band."""
     by_data = bool(sensor.lens.table)
     return _AFTER_S + TABLE_S * by_data, TABLE_BAND_S * by_data
 
@@ -678,9 +679,10 @@ def _after_s(sensor: SensorConfig) -> tuple[float, float]:
 def _opened(
     order: Order, exposure_s: float | None, sensor: SensorConfig
 ) -> tuple[SceneFile, tuple[Scene, ...], Floats | None]:
-    """Open the scene, as it is at the middle of the exposure if it moves, and at each of its times.
+    """Open the scene; if it moves, open it at the middle of the exposure and at each of its times.
 
-    Where rows roll the exposure lasts until the last row's end, and each row's shares of the times follow.
+    If the rows of a moving scene's exposure roll, the times reach from the first row's start to the last row's end, and
+    the third result holds each row's shares of them; otherwise it is None.
     """
 
     def at(time_s: float | None) -> SceneFile:

@@ -1,4 +1,4 @@
-"""An even neutral field before a camera in closed form: electrons, SNR, and the light that an SNR takes."""
+"""Formulas for a camera that looks at an even neutral field: electrons, SNR, and the light that an SNR needs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ class LightForSnr:
     ----------
     channel : str
     electrons : float
-        Photo-electrons then; inf where no light is enough.
+        Photo-electrons at which the SNR is reached; inf if no light is enough.
     luminance_cd_m2 : float
         Luminance of an even neutral field.
     illuminance_lux : float
@@ -60,7 +60,8 @@ def snr(electrons: Floats, sensor: SensorConfig, exposure_s: float, channel: str
     if channel is not None:
         require_name("channel", channel, sensor.channels)
     even = replace(sensor, pixel=replace(sensor.pixel, crosstalk=0.0))
-    # Each number of electrons is a frame of its own, for which a camera may switch its gain or meter a channel.
+    # Each value in `electrons` is treated as a frame of its own, for which a camera may switch its gain or meter a
+    # channel.
     chosen = sensor.chip.switched or any(x.metered for x in sensor.chip.channels)
     fields = electrons.ravel()[:, None] if chosen else electrons[None]
     moments = [frame_moments(field, resolve(even, field, exposure_s, channel)) for field in fields]
@@ -102,7 +103,7 @@ def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s
     ratios = {}
     for name, e in electrons.items():
         full_e = max(x.headroom_e for x in at_channel(chip_readings(sensor, exposure_s), name))
-        metered = any(x.metered for x in sensor.chip.channels if x.channel == name)  # it stays below the full well
+        metered = any(x.metered for x in sensor.chip.channels if x.channel == name)  # such a channel never fills
         ratios[name] = np.where(metered | (e < full_e), snr(e, sensor, exposure_s, name), np.nan)
     return ratios
 
@@ -128,7 +129,7 @@ def _electrons_of_law(snr: float, reading: PlainReading) -> float:
     """Return the photo-electrons at which one reading reaches an SNR.
 
     With the variance a + b e + c e^2 they solve (1 - snr^2 c) e^2 - snr^2 b e - snr^2 a = 0. They are infinite for an
-    SNR above 1 / sqrt(c), the limit that PRNU sets, and where the well is full before.
+    SNR above 1 / sqrt(c), the limit that PRNU sets, and if the well is already full at less light.
     """
     law = reading.law
     a, b = law.dark_e**2 + law.fixed_e**2, law.shot
