@@ -1,8 +1,8 @@
-"""What a picture costs in time, memory and samples, before anything is computed.
+"""Estimate what a picture costs in time, memory and samples, before anything is computed.
 
 The numbers are processor seconds on a server's cores with AVX-512 (`benchmarks/bench_picture.py` prints them for
-another machine); `pace` says how much longer another machine takes. What all cores share is divided by their number.
-Scenes differ: a chart's samples cost a third.
+another machine); `pace` says how much longer another machine takes. The time of work that all cores share is divided by
+their number. Scenes differ: a sample of a chart takes a third of the time stated here.
 """
 
 import os
@@ -20,16 +20,17 @@ from rodcone.progress import duration
 
 START_S = 1.3  # imports of a process
 _RENDER_S = 1.1e-6  # per pixel, sample and light group, in 20 bands
-_PATHS = 0.7  # share of it that doesn't grow with the bands
+_PATHS = 0.7  # share of `_RENDER_S` that doesn't grow with the number of bands
 _COMPILE_S = 0.3  # per band, if no kernel is stored on disk
 PILOT_SPP = 32  # samples per pixel of the pilot that a long render begins with
-# A fixed piece of work on the machine of these numbers. A machine with AVX2, as `make test` is measured on, takes 2.2
-# times as long.
+# Time of a fixed piece of work (`_work_s`) on the machine where these numbers were measured. A machine with AVX2, on
+# which `make test` is measured, takes 2.2 times as long.
 _WORK_S = 8.8e-3
-# Time that a render of the same scene at another moment adds: for loading and tracing it anew, and for storing and
-# averaging its light, per pixel, band and light group.
+# Time that another render of a moving scene adds, besides its samples: for loading the scene and recording its kernels
+# anew, and, per pixel, band and light group, for storing and averaging the light.
 _ANOTHER_S = 0.8, 1.2e-7
-# Of an exposure behind a lens by data: a band's images of points, however many pixels, and a pixel and band's spread.
+# Time that a lens by data adds to an exposure: per band, for its images of points, whatever the number of pixels; and
+# per pixel and band, for spreading the light.
 TABLE_BAND_S, TABLE_S = 0.5, 2.5e-7
 KERNELS = Path.home() / ".drjit"
 
@@ -48,18 +49,18 @@ class PictureCost:
         Most samples per pixel of the render; 0 where the light is there already, None where a render goes on until it
         reaches an error.
     after_s : float
-        Processor seconds per pixel and band of what follows the light.
+        Processor seconds per pixel and band of the steps after the light.
     denoised : bool
     max_seconds : float, optional
         Longest time of the render.
     through : str
         The lens that the scene is rendered through, in words; empty for a pinhole.
     times : int
-        Number of renders whose mean is taken, each with so many samples, for a scene that moves.
+        Number of renders that are averaged for a scene that moves, each with `spp` samples per pixel.
     light_arrays : int, optional
-        Of what makes the light's bands one at a time, as `rodcone.memory.memory` takes it.
+        Number of all-band arrays of a light whose bands are imaged one at a time, as in `rodcone.memory.memory`.
     band_s : float
-        Processor seconds per band of what follows the light and doesn't grow with the pixels.
+        Processor seconds per band of those steps after the light that don't depend on the number of pixels.
     """
 
     size: tuple[int, int]
@@ -147,7 +148,7 @@ def render_seconds(pixels: int, bands: int, groups: int, spp: float) -> float:
 
 
 def another_s(pixels: float, bands: int, groups: int) -> float:
-    """Return the processor time that a render of the same scene at another time takes beside its samples [s]."""
+    """Return the processor time that another render of a moving scene takes, besides that of its samples [s]."""
     return _ANOTHER_S[0] + averaged_s(pixels, bands, groups)
 
 
@@ -158,7 +159,7 @@ def averaged_s(pixels: float, bands: int, groups: int) -> float:
 
 @cache
 def pace() -> float:
-    """Return how much longer this machine takes than the machine of the numbers, as measured on a piece of work."""
+    """Return this machine's time for a fixed piece of work over that of the machine whose numbers are stated here."""
     return min(_work_s() for _ in range(3)) / _WORK_S
 
 

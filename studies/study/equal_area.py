@@ -1,4 +1,4 @@
-"""Sensors of one size: pixels by pitch, and pictures averaged to the pixels of the coarsest sensor."""
+"""Compare sensors of one size: pixels follow from each pitch; pictures are averaged to the coarsest sensor's pixels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -32,17 +32,20 @@ class EqualArea:
     coarsest_um: float
 
     def shape(self, picture: tuple[int, int], pitch_um: float, block: int = 1) -> tuple[int, int]:
-        """Return height and width in pixels of a pitch, in a picture's proportions and in whole blocks of pixels."""
+        """Return the sensor's height and width in pixels of `pitch_um`, for the proportions of a picture.
+
+        Both are multiples of `block`.
+        """
         blocks = self.side_um / (pitch_um * block * max(picture))
         return block * max(1, round(picture[0] * blocks)), block * max(1, round(picture[1] * blocks))
 
     def view(self, radiance: SpectralRadiance, pitch_um: float, block: int = 1) -> SpectralRadiance:
-        """Return the radiance averaged over the pixels of a pitch, in whole blocks."""
+        """Return the radiance averaged over each of the sensor's pixels; the parameters are as in `shape`."""
         return replace(radiance, values=area_average(radiance.values, self.shape(radiance.shape, pitch_um, block)))
 
 
 def sensor_shapes(area: EqualArea, sensors: Sequence[str], picture: tuple[int, int]) -> dict[str, tuple[int, int]]:
-    """Return the height and width of each sensor in pixels, for a picture's proportions."""
+    """Return the height and width of each sensor in pixels of its raw image, for a picture's proportions."""
     opened = {name: preset(name) for name in sensors}
     return {name: area.shape(picture, *site_grid(sensor)) for name, sensor in opened.items()}
 
@@ -53,7 +56,7 @@ def site_grid(sensor: SensorConfig) -> tuple[float, int]:
 
 
 def require_pixels(area: EqualArea, sensors: Sequence[str], picture: tuple[int, int]) -> None:
-    """Raise `InputError` for a render of fewer pixels than a sensor has: it would be enlarged."""
+    """Raise `InputError` if a render has fewer pixels than a sensor, for which it would have to be enlarged."""
     for name, shape in sensor_shapes(area, sensors, picture).items():
         if max(shape) > max(picture):
             raise InputError(
@@ -63,13 +66,13 @@ def require_pixels(area: EqualArea, sensors: Sequence[str], picture: tuple[int, 
 
 
 def area_average(values: NDArray[Real], shape: tuple[int, int]) -> NDArray[Real]:
-    """Average a picture over each pixel of another grid on the same area, with pixels as even squares.
+    """Average a picture over each pixel of another grid on the same area; within a pixel the picture is constant.
 
     Parameters
     ----------
     values : (h, w, ...) floating
     shape : (int, int)
-        Height and width of the other grid, finer or coarser.
+        Height and width of the other grid in pixels; it may be finer or coarser.
 
     Returns
     -------
@@ -92,9 +95,10 @@ def in_pixels(radiance: SpectralRadiance, samples: int) -> SpectralRadiance:
 
 
 def _overlaps(pixels: int, other: int) -> NDArray[np.float64]:
-    """Return the share of each of `pixels` intervals in each of `other` on the same length, shape (other, pixels).
+    """Divide one length into `pixels` and into `other` equal intervals; return how the second overlap the first.
 
-    Each row has the sum 1.
+    The result, shape (other, pixels), is the share of each of the `other` intervals that lies in each of the `pixels`
+    intervals. Each row has the sum 1.
     """
     ends, starts = np.arange(1, pixels + 1) / pixels, np.arange(pixels) / pixels
     low, high = np.arange(other)[:, None] / other, np.arange(1, other + 1)[:, None] / other

@@ -1,4 +1,4 @@
-"""Depth of field of a scene that is rendered: the camera's f-number, and the distance of focus asked for."""
+"""Depth of field of a rendered scene, from the camera's f-number and the requested distance of focus."""
 
 from dataclasses import replace
 
@@ -13,20 +13,20 @@ def in_focus(
 ) -> tuple[Scene, str]:
     """Return the scene as a lens focused at a distance sees it, and the lens in words.
 
-    A render of it holds for this f-number alone, and is stored apart from others.
+    A render of this scene is valid for this f-number alone, and is stored apart from others.
 
     Parameters
     ----------
     scene : Scene
         A scene whose lengths are in metres.
     sensor : SensorConfig
-        Gives the f-number of its lens, and its pixels.
+        Sensor whose lens states the f-number, and whose pixels give the default focal length.
     size : (int, int)
         Height and width of the picture in photodiodes.
     focus_m : float
     focal_length_mm : float, optional
-        Left out, that of a sensor as wide as the picture's pixels; a picture of few pixels then has a lens with a small
-        pupil.
+        Left out, the focal length for a sensor as wide as the picture's pixels; for few pixels the lens then has a
+        small pupil.
 
     Raises
     ------

@@ -11,17 +11,16 @@ from sensor.raw import ISO_RANGE
 from studies.metrics.truth import light_in_bands, neutral_electrons
 
 ISO = "ISO"
-ISO_SATURATION_LUX_S = 78.0  # ISO 12232:2019: saturation-based speed is this over the saturating exposure [lux s]
-_ROUNDING = 0.015  # tolerance because users round: a base speed of 51.56 is asked for as 51
+ISO_SATURATION_LUX_S = 78.0  # ISO 12232:2019: the saturation-based speed is this over the saturating exposure [lux s]
+_ROUNDING = 0.015  # relative tolerance, because users round: for a base speed of 51.56 they may write 51
 
 
 def iso_speed(sensor: SensorConfig) -> float | None:
-    """Return the saturation-based speed of green under D65; None where there is none.
+    """Return the saturation-based speed of green under D65; None if the camera has no such speed.
 
-    A camera has none without G, where G collects nothing, or where the speed is beyond what files can hold. The speed
-    is that of the exposure in which green's mean reads the converter's top value, without half a stop of headroom; it
-    is in proportion to the gain. D65's table ends at 780 nm: a camera that sees longer wavelengths gets no light from
-    there on.
+    A camera has none without G, if G collects nothing, or if the speed is beyond what files can hold. The speed is that
+    of the exposure in which green's mean reads the converter's top value, without half a stop of headroom. It is
+    proportional to the gain. D65's table ends at 780 nm, so a camera that sees longer wavelengths gets no light there.
     """
     if "G" not in sensor.channels:
         return None
@@ -42,7 +41,7 @@ def at_gain(sensor: SensorConfig, text: str) -> SensorConfig:
     Raises
     ------
     InputError
-        For another text, a gain that the camera doesn't have, or a speed under its base speed.
+        For any other text, a gain that the camera doesn't have, or a speed below its base speed.
     """
     if text == OWN:
         return sensor
@@ -57,7 +56,7 @@ def at_gain(sensor: SensorConfig, text: str) -> SensorConfig:
 
 
 def gain_text(gain: float | None, iso: float | None) -> str:
-    """Return the text for `at_gain` that stands for a gain or a speed, at most one of which is given."""
+    """Write a gain or a speed, at most one of which may be given, as a text for `at_gain`; ``own`` without either."""
     if gain is not None and iso is not None:
         raise InputError(f"gain: {gain:g} beside iso {iso:g}; allowed: one of the two; leave one out")
     return OWN if gain is None and iso is None else f"{gain:.12g}" if gain is not None else f"{ISO} {iso:.12g}"
@@ -69,7 +68,7 @@ def gain_for_iso(sensor: SensorConfig, iso: float) -> float:
     Raises
     ------
     InputError
-        For a speed under that at gain 1, or a camera that has none.
+        For a speed below that at gain 1, or a camera without a saturation-based speed.
     """
     base = iso_speed(with_gain(sensor, 1.0))
     if base is None:

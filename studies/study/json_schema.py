@@ -18,12 +18,12 @@ def schema_of(kind: type, known: Mapping[Any, Mapping[str, Any]], *, single: boo
     Parameters
     ----------
     kind : dataclass
-        Its annotations give the kinds and ranges of values, its docstring's ``Attributes`` their descriptions.
+        Its annotations give the types and ranges of values, its docstring's ``Attributes`` their descriptions.
     known : mapping
-        Schemas of types that a file writes in another form than the dataclass holds, and by ``(dataclass, field)`` of
-        single fields; an empty one leaves the field out.
+        Schemas for types that a file writes in another form than the dataclass holds. A key is such a type, or
+        ``(dataclass, field)`` for a single field; an empty schema leaves the field out.
     single : bool
-        Whether one value may stand for a list of one.
+        Whether a file may write a single value in place of a list with one value.
     """
     texts = _descriptions(kind)
     properties = {}
@@ -60,7 +60,7 @@ def _of(kind: object, known: Mapping[Any, Mapping[str, Any]], single: bool) -> d
 
 
 def _list_of(parts: tuple[Any, ...], known: Mapping[Any, Mapping[str, Any]], single: bool) -> dict[str, Any]:
-    """Return the schema of a tuple's list: of as many values as are named, or of any number of one kind."""
+    """Return the schema of a list that is read into a tuple with the types `parts`; an Ellipsis allows any length."""
     items = [_of(part, known, single) for part in parts if part is not Ellipsis]
     if parts[-1] is not Ellipsis:
         return {"type": "array", "prefixItems": items, "minItems": len(items), "maxItems": len(items)}

@@ -11,7 +11,7 @@ from scenes.levels import DEMO_LEVELS
 from sensor.exposure import RULES
 
 UNITS = ("cd/m2", "lux")
-SYMBOLS = {"lx": "lux", "cd/m^2": "cd/m2"}  # other spellings of the two
+SYMBOLS = {"lx": "lux", "cd/m^2": "cd/m2"}  # other spellings of the units
 NAMED = {level.name: level for level in DEMO_LEVELS}
 _FORM = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
 
@@ -22,7 +22,7 @@ def parse_level(text: str) -> tuple[float, str]:
     Raises
     ------
     InputError
-        For a missing number, an unknown unit, or a level that is not above 0.
+        For an unknown name, a missing number, an unknown unit, or a level that is not above 0.
     """
     if text in NAMED:
         return NAMED[text].luminance_cd_m2, UNITS[0]
@@ -43,7 +43,7 @@ def parse_level(text: str) -> tuple[float, str]:
 
 
 def levels_between(over: str) -> dict[str, float]:
-    """Return the named levels from one to another, given as street:classroom [cd/m^2]."""
+    """Return the luminance of the named levels in a range such as ``street:classroom``, by name [cd/m^2]."""
     names = list(NAMED)
     first, colon, last = over.partition(":")
     if not colon or first not in names or last not in names or names.index(first) > names.index(last):
@@ -73,14 +73,17 @@ def parse_exposure(text: str, name: str = "exposures", least_s: float = 1e-9) ->
 
 
 LOWEST_NM, HIGHEST_NM = 300.0, 1100.0  # range of `render.spectrum.flat`, black bodies and the sun's table
-LEAST_RANGE_NM = 100.0  # the widest band that `RenderLimits.band_nm` takes
-# A light whose table ends before the bands do counts as dark beyond it if its last value is at most this share of its
-# peak. White LEDs of the CIE end at 780 nm with 0.6 to 5 %.
+LEAST_RANGE_NM = 100.0  # the widest band that `RenderLimits.band_nm` allows
+# A light whose table ends before the bands do counts as dark from there on if its last value is at most this share of
+# its peak. The CIE's tables of white LEDs end at 780 nm with values of 0.6 to 5 % of the peak.
 _RUN_OUT = 0.01
 
 
 def check_known(spectrum: str, range_nm: tuple[float, float]) -> None:
-    """Raise `InputError` for an unknown light, or one not known as far as a study renders beyond 380-780 nm."""
+    """Raise `InputError` for an unknown light, or for one that isn't known over a range beyond 380-780 nm.
+
+    Beyond 380-780 nm a light with emission lines is refused too.
+    """
     light = illuminant(spectrum)
     if range_nm[0] >= VISIBLE_NM[0] and range_nm[1] <= VISIBLE_NM[1]:
         return

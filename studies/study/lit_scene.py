@@ -65,9 +65,10 @@ class OpenedScene:
         Hash of all that the scene is.
     notes : tuple of str
     moving : tuple of Scene
-        The scene at times that are spread over `whole_s`, in whose middle `scene` is; empty where it stands still.
+        The scene at times that are spread over `whole_s`; `scene` is the one in the middle of this time. Empty for a
+        scene that stands still.
     whole_s : float
-        Time that all exposures of a moving scene lie within [s], each in the middle of it.
+        Length of the longest exposure of a moving scene [s]; all exposures have the same middle.
     """
 
     choice: SceneChoice
@@ -93,7 +94,8 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
     ------
     InputError
         For a scene that is unknown or can't be read, a level in lux without a reference plane, another spectrum for
-        lights that have colours of their own, or a size for a sensor that bins or has more.
+        lights that have colours of their own, or a size that doesn't fit a sensor: one that needs more pixels, or an
+        odd number for one that bins.
     """
     if is_reference(choice.source):
         raise InputError(
@@ -152,7 +154,7 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
 
 
 def _whole_s(study: Study, rows: int) -> float:
-    """Return the length of time in which all exposures of a scene that moves lie [s]."""
+    """Return the length of the longest exposure of a scene that moves, from the first row's start to the last's end."""
     exposures_s = [parse_exposure(exposure) or 0.0 for exposure in study.exposures]
     return longest_span_s([preset(name) for name in study.sensors], rows, exposures_s)
 
@@ -188,18 +190,19 @@ def make_transport(
     share: Callable[[Transport], float] | None = None,
     samples: int = 1,
 ) -> tuple[Transport, tuple[str, ...]]:
-    """Render a scene, or read a picture file, with what had to be assumed of the file.
+    """Render a scene, or read a picture file; also return notes on what had to be assumed about the file.
 
     Parameters
     ----------
     model : RenderModel or None
         How the scene is rendered; None for a picture file.
     cache : Path
-        Folder of renders: a coarser one is continued, a finer one is taken.
+        Folder of renders. One of this scene with fewer samples is continued; one with more is used as it is.
     progress : callable
-        As in `render.engine.render`; called before it with an infinite error, because the first passes may compile.
+        As in `render.engine.render`. It is also called before the render, with an infinite error, because kernels may
+        have to be compiled first.
     share : callable, optional
-        Noise variance of a render over the sensor's own, for a study with a `noise_share`.
+        Function that returns a render's noise variance over the sensor's own, for a study with a `noise_share`.
     samples : int
         Samples of the light along each side of a pixel (`studies.study.model.samples_a_side`); each is rendered like a
         pixel.
@@ -207,8 +210,8 @@ def make_transport(
     Raises
     ------
     InputError
-        As for `render.engine.render` and `open_radiance_file`; where a render made here disagrees with the reference
-        light.
+        As `render.engine.render` and `open_radiance_file`, and if the render that is made here disagrees with the
+        reference light.
     KeyboardInterrupt
         Where Ctrl-C ended the render; what was rendered is in `cache`.
     """
@@ -278,7 +281,7 @@ def under(transport: Transport, spectrum: str) -> Transport:
 
 
 def asked_spectra(scene: Scene, lights: Sequence[str]) -> dict[str, Spectrum]:
-    """Return the illuminants that are asked for by light group, each at the luminance of the group's own spectrum.
+    """Return the requested illuminant of each light group, at the luminance of the group's own spectrum.
 
     Parameters
     ----------
@@ -307,7 +310,7 @@ def asked_spectra(scene: Scene, lights: Sequence[str]) -> dict[str, Spectrum]:
 
 
 def white_spectrum(opened: OpenedScene, spectrum: str) -> Spectrum:
-    """Return the light that cameras' colours are set to where all lights have a spectrum of the study."""
+    """Return the light that cameras' colours are set to when all lights have one of the study's spectra."""
     return opened.white.spectrum if spectrum == OWN else illuminant(spectrum)
 
 
@@ -317,7 +320,7 @@ def lux_per_cd_m2(lit: Transport, levels: Sequence[str]) -> float | None:
 
 
 def in_lux(levels: Sequence[str]) -> bool:
-    """Return whether a level is in lux, because the illuminance then has to be traced, which takes time."""
+    """Return whether any level is in lux; only then the illuminance has to be traced, which takes time."""
     return any(parse_level(level)[1] == "lux" for level in levels)
 
 

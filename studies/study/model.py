@@ -1,4 +1,4 @@
-"""What is modelled: how each scene is rendered, and what each condition's image holds."""
+"""Models of a study: how each scene is rendered, and which effects of lens and readout each condition's image has."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ _DARK_S = 1e7  # longer than any exposure
 
 @dataclass(frozen=True)
 class RenderModel:
-    """Way to render one scene for all its conditions: bands [nm], samples per pixel, the light that is photographed."""
+    """Way to render one scene for all its conditions: bands [nm], samples per pixel, and whether light is denoised."""
 
     wavelength_nm: tuple[float, ...]
     width_nm: tuple[float, ...]
@@ -27,7 +27,7 @@ class RenderModel:
 
 
 def in_bands(bands: tuple[Floats, Floats], spp: int, denoise: bool = False) -> RenderModel:
-    """Render in bands, by their centres and widths [nm]."""
+    """Return the model of a render in bands, which are given as their centres and widths [nm]."""
     nm, width_nm = (tuple(x.tolist()) for x in bands)
     return RenderModel(nm, width_nm, spp, denoise)
 
@@ -64,21 +64,22 @@ class LensTerms:
     table: str | None = None
 
     def on(self, lens: LensConfig) -> LensConfig:
-        """Return a lens with the terms that are stated."""
+        """Return a lens in which the terms that the study states replace the lens's own."""
         terms = {name: value for name, value in vars(self).items() if value is not None and name != "shake"}
         of_table: dict[str, Any] = {} if self.table is None else terms_of(self.table)
         return held_lens(replace(lens, **(terms | of_table)), self.shake)
 
     def behind(self, sensor: SensorConfig) -> SensorConfig:
-        """Return the camera behind the study's lens by data, if there is one, whose f-number counts for exposures."""
+        """Return the camera behind the study's lens by data, whose f-number then decides exposures, if it has one."""
         return sensor if self.table is None else with_lens(sensor, self.table)
 
 
 @dataclass(frozen=True)
 class ImageModel:
-    """The lens whose terms an image holds (0: left out), and the readout.
+    """The lens effects that an image includes (a term of 0 leaves one out), and how the sensor is read out.
 
-    `exact` reads out in NumPy's double precision; otherwise Dr.Jit does in single precision, where it runs.
+    With `exact` NumPy computes the readout in double precision. Otherwise Dr.Jit computes it in single precision, on
+    machines where it runs.
     """
 
     lens: LensConfig
@@ -86,19 +87,19 @@ class ImageModel:
 
 
 def samples_a_side(scene: str, sensors: Iterable[SensorConfig]) -> int:
-    """Return how many samples of a scene's light cameras need along each side of a pixel.
+    """Return how many samples of a scene's light the cameras need along each side of a pixel.
 
-    A scene that measures sharpness takes as many as the sharpest lens needs (`sensor.optics.least_samples`): with one
-    sample per pixel its MTF50 would be too low. All other scenes take one.
+    A scene that measures sharpness needs as many as the sharpest lens does (`sensor.optics.least_samples`): with one
+    sample per pixel its MTF50 would be too low. All other scenes need one.
     """
     return max((least_samples(sensor) for sensor in sensors), default=1) if scene == EDGE else 1
 
 
 def unit_exposure_s(radiance: SpectralRadiance, preset: SensorConfig, channel: str | None = None) -> float:
-    """Return the auto exposure of a scene at 1 cd/m^2 [s], without a limit; `_DARK_S` where there is no light.
+    """Return the automatic exposure time of a scene at 1 cd/m^2 [s]; `_DARK_S` is the longest, for want of light.
 
-    It is the same for every model of the lens and, for G with the preset's own mosaic, for every processor, so that
-    their pictures can be compared.
+    The time leaves the lens's blur, glare and falloff out. So it is the same for every model of the lens and, for G
+    with the preset's own mosaic, for every processor, and their pictures can be compared.
     """
     glare = "veiling_glare", "scatter", "eye_age_years"
     blur_and_falloff = "diffraction", "defocus_um", "horizontal_view_deg", "falloff_power", "vignetting"

@@ -1,4 +1,4 @@
-"""When a scene that moves is looked at: times within an exposure, and the time that a study's exposures lie within."""
+"""Times within an exposure at which a scene that moves is rendered, and the longest exposure of a study."""
 
 from collections.abc import Iterable
 
@@ -11,11 +11,11 @@ from sensor.flicker.figures import flicker_figures
 from sensor.flicker.rows import reads_parts
 from sensor.flicker.waveform import Waveform
 
-MOST_SWING = 0.05  # of a lamp's light between parts of an exposure that count alike
+MOST_SWING = 0.05  # most that a lamp's mean light may swing between the equal parts of an exposure, as a share
 
 
 def moments_s(exposure_s: float, count: int) -> Floats:
-    """Give the middles of `count` equal parts of an exposure that begins at 0, shape (count,) [s].
+    """Return the middles of `count` equal parts of an exposure that begins at time 0, shape (count,) [s].
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def moments_s(exposure_s: float, count: int) -> Floats:
 
 
 def site_starts_s(sensor: SensorConfig, rows: int) -> Floats:
-    """Give when the exposure of each row of photodiodes starts [s], after the first one's; shape (rows,).
+    """Return when the exposure of each row of photodiodes starts [s], from the first start on; shape (rows,).
 
     Photodiodes that bin are exposed together.
     """
@@ -46,29 +46,29 @@ def site_starts_s(sensor: SensorConfig, rows: int) -> Floats:
 
 
 def longest_span_s(sensors: Iterable[SensorConfig], rows: int, exposures_s: Iterable[float]) -> float:
-    """Give the longest time from the first row's start to the last row's end, of any sensor and exposure [s]."""
+    """Return the longest time from the first row's start to the last row's end, over all sensors and exposures [s]."""
     readouts_s = [float(site_starts_s(sensor, rows).max()) for sensor in sensors]
     return max(readouts_s) + max(exposures_s)
 
 
 def check_moving(sensor: SensorConfig, lamps: Iterable[Waveform], whole_s: float, count: int) -> None:
-    """Check that the times at which a scene that moves is looked at may count by their number alone.
+    """Check that renders at several times of an exposure may simply be averaged, because all parts of it count alike.
 
     Parameters
     ----------
     sensor : SensorConfig
     lamps : iterable of Waveform
-        That flicker.
+        Waveforms of lamps that flicker.
     whole_s : float
-        From the first row's start to the last row's end.
+        Time from the first row's start to the last row's end.
     count : int
-        Of the times.
+        Number of the times.
 
     Raises
     ------
     InputError
-        For a camera that reads some charge after a part of the exposure, and for lamps whose light isn't steady over
-        the part of it for which one time stands.
+        For a camera that reads some charge after only a part of the exposure, and for lamps whose mean light over each
+        of `count` equal parts of the exposure swings by more than `MOST_SWING`.
     """
     if reads_parts(sensor):
         raise InputError(

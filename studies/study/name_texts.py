@@ -1,4 +1,7 @@
-"""Sentences on what the program knows by name, from a file: the catalogues import Dr.Jit and take a second to load."""
+"""Sentences that describe mosaics, processors and so on, by name.
+
+They are in a file of their own, because the catalogues import Dr.Jit and take a second to load.
+"""
 
 import tomllib
 from pathlib import Path

@@ -15,7 +15,7 @@ class RenderFacts:
     integrator, variant, stopped_by : str
     seconds : float
     spp : float
-        Samples per pixel, in the mean.
+        Mean samples per pixel.
     bands : int
     relative_mc_error, relative_level_error : float or None
         Errors of the lit scene, as in `render.radiance.SpectralRadiance`.

@@ -1,4 +1,4 @@
-"""Monte Carlo noise of a render beside the sensor's own noise: its share, the note on it, and a render with little."""
+"""Compare a render's Monte Carlo noise with the sensor's own: measure it, note it, and render until it is low."""
 
 from collections.abc import Callable, Sequence
 from math import ceil, log2
@@ -23,10 +23,10 @@ from sensor.response import channel_electrons, electrons_per_irradiance
 MOST_SHARE = 0.03
 OF_PIXELS = 0.95
 
-SPECKLE = 5.0  # standard deviations of the sensor's noise: chance alone gives 1 pixel in 2 million
+SPECKLE = 5.0  # larger errors, in the sensor's standard deviations, are speckles; chance gives 1 in 2 million pixels
 FIRST_SPP = 128  # samples per pixel that are enough to predict how many more are needed
-MARGIN = 1.05  # factor on the predicted number of samples, because it is an estimate
-MOST_GROWTH = 4.0  # largest factor on the samples from one prediction to the next
+MARGIN = 1.05  # the predicted number of samples is multiplied by this, because it is an estimate
+MOST_GROWTH = 4.0  # the number of samples grows at most by this factor from one prediction to the next
 
 
 def monte_carlo_share(
@@ -51,8 +51,8 @@ def monte_carlo_share(
     exposure_s : float
         Exposure time, for the dark current [s].
     of_pixels : float, optional
-        Share of pixels (0 to 1): the result is the quantile that this share of the pixels stays under. Left out, the
-        result is the mean variance over the sensor's mean variance.
+        Share of pixels (0 to 1): the result is the ratio that this share of the pixels stays below. Left out, it is the
+        mean Monte Carlo variance over the sensor's mean variance.
     """
     if expected_e.ndim == 2:
         variance_e2, inside = _noise_and_room(expected_e, resolve(sensor, expected_e, exposure_s))
@@ -70,9 +70,9 @@ def monte_carlo_share(
 def _noise_and_room(
     expected_e: NDArray[np.float64], readings: Sequence[PlainReading]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the variance of the light as estimated from each sample, and which samples are under the well.
+    """Return for each pixel the sensor's variance of an estimate of the light, and whether the pixel isn't saturated.
 
-    The frame is a mosaic, or what one channel reads at every pixel.
+    `expected_e` is a mosaic, or what one channel would read at every pixel.
     """
     return light_variance(expected_e, readings), unsaturated(expected_e, readings)
 
@@ -84,14 +84,13 @@ def _mean_share(error_e: NDArray[np.floating], variance_e2: NDArray[np.float64],
 def monte_carlo_bound(
     errors_e: NDArray[np.floating], expected_e: NDArray[np.float64], readings: Sequence[PlainReading]
 ) -> float:
-    """Return the Monte Carlo variance to count for a frame, over the sensor's own noise; 0 where the well is full.
+    """Return the Monte Carlo variance of a frame over the sensor's own noise variance; 0 if every pixel is full.
 
     Parameters
     ----------
     errors_e : (1 or 2, h, w) array
-        One draw of the unbiased light's error [e-]; or the differences of denoised light from two folds. The mean of
-        the product of these is the whole squared error, of which the upper limit is counted
-        (`render.denoised.relight`).
+        One draw of the unbiased light's error [e-], or the differences of denoised light from two independent folds.
+        The mean product of these two is the whole squared error. Its upper limit is used (`render.denoised.relight`).
     expected_e : (h, w) float64
     readings : sequence of PlainReading
         Readings that the camera takes of the frame (`sensor.readings.resolve.resolve`).
@@ -114,10 +113,10 @@ def render_share(
     *,
     samples: int = 1,
 ) -> float:
-    """Return the Monte Carlo share that `OF_PIXELS` of the pixels stay under, over every channel.
+    """Return the Monte Carlo variance over the sensor's own below which `OF_PIXELS` of the pixels lie, in any channel.
 
-    Bands of a path rise and fall together, so their standard errors are added, which is the most that the variance can
-    be. The variance is pooled over 3x3 pixels.
+    The bands of a path rise and fall together, so their standard errors are added; the variance can't be larger. It is
+    pooled over 3x3 pixels.
 
     Parameters
     ----------
@@ -128,7 +127,7 @@ def render_share(
     longest_s : float
         Longest auto exposure [s].
     exposure_s : float, optional
-        Exposure time; left out, the auto exposure.
+        Exposure time; left out, the automatic exposure chooses it.
     samples : int
         Samples of the light along each side of a pixel.
     """
@@ -149,10 +148,10 @@ def render_share(
 def speckle_sizes(
     error_e: NDArray[np.floating], expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float
 ) -> NDArray[np.float64]:
-    """Return the errors larger than `SPECKLE`, over the sensor's own standard deviation, below saturation, (pixel,).
+    """Return the errors of unsaturated pixels in the sensor's standard deviations, if above `SPECKLE`; (pixel,).
 
-    If the render's noise is smaller than the sensor's, only single bright samples cause so large errors. Parameters are
-    those of `monte_carlo_share`, for one frame.
+    If the render's noise is smaller than the sensor's, only single bright samples cause errors as large as these. The
+    parameters are as in `monte_carlo_share`, for one frame.
     """
     variance_e2, inside = _noise_and_room(expected_e, resolve(sensor, expected_e, exposure_s))
     size = np.abs(error_e) / np.sqrt(variance_e2)
@@ -160,14 +159,14 @@ def speckle_sizes(
 
 
 def noise_note(share: float, spp: float, speckles: NDArray[np.float64] | None = None) -> str:
-    """Say that a render's noise shows, and how many samples would do; return an empty text if it doesn't show.
+    """Return a note that a render's noise shows, and how many samples would hide it; empty if it doesn't show.
 
     Parameters
     ----------
     share : float
         Monte Carlo variance over the sensor's own.
     spp : float
-        Samples per pixel of the render; 0 of a file, for which no number of samples can be given.
+        Samples per pixel of the render; 0 for a file, for which no number of samples can be given.
     speckles : (pixel,) float64, optional
         As from `speckle_sizes`.
     """
@@ -178,7 +177,7 @@ def noise_note(share: float, spp: float, speckles: NDArray[np.float64] | None = 
     elif speckles is not None and speckles.size:
         spots = f"{speckles.size} pixels are speckles" if speckles.size > 1 else "1 pixel is a speckle"
         what = f"{spots}: the render's noise there is over {SPECKLE:g} times the sensor's"
-        factor = float(speckles.max()) / SPECKLE  # because one sample's part of a pixel falls as their number grows
+        factor = float(speckles.max()) / SPECKLE  # one sample's part of a pixel falls as their number grows
     else:
         return ""
     remedy = f"; {2 ** ceil(log2(spp * factor))} samples a pixel would do" if spp else ""
@@ -195,12 +194,12 @@ def render_quietly(
     max_seconds: float | None,
     **options: Any,
 ) -> Transport:
-    """Render until `share` is `most_share` or less, or samples or time are used up; what was made is kept.
+    """Render until `share` is `most_share` or less, or until samples or time are used up; return what was rendered.
 
     Parameters
     ----------
     share : callable
-        The render's noise variance over the sensor's own, such as `render_share`.
+        Function that returns a render's noise variance over the sensor's own, such as `render_share`.
     most_share : float
     max_spp : int
         Samples per pixel, at most.

@@ -1,4 +1,4 @@
-"""What a study looks at: a scene by name, a Mitsuba scene of the user's own, or a spectral picture file."""
+"""Open the subject of a study: a scene by name, a Mitsuba scene of the user's own, or a spectral picture file."""
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -101,7 +101,7 @@ def defined(texts: Sequence[str]) -> dict[str, str]:
 
 
 def asked_size(size: tuple[int, int], height: int | None, width: int | None) -> tuple[int, int]:
-    """Return the height and width asked for; a side that wasn't asked for follows from the proportions of `size`."""
+    """Return the requested height and width; a side that isn't given follows from the proportions of `size`."""
     for name, pixels in (("height", height), ("width", width)):
         if pixels is not None:
             require_whole(name, pixels, 1, 1 << 15, "give pixels")
@@ -116,7 +116,7 @@ def asked_level(scene: Scene, text: str | None) -> dict[str, float]:
     Raises
     ------
     InputError
-        For what is no light level, or lux in a scene without a reference plane.
+        For a text that is no light level, or lux in a scene without a reference plane.
     """
     if text is None:
         return {}
@@ -138,7 +138,7 @@ LIGHT = "D65"  # white of sRGB, for pictures that don't state their light
 
 @dataclass(frozen=True)
 class AdoptedWhite:
-    """Light that colours are judged under, what had to be assumed for it, and whether a person named it."""
+    """Light under which colours are judged, notes on what was assumed about it, and whether the user named it."""
 
     spectrum: Spectrum
     notes: tuple[str, ...] = ()
@@ -152,7 +152,7 @@ def first_light(groups: Mapping[str, LightGroup], default: Spectrum) -> Spectrum
 
 
 def default_white(path: str | Path) -> AdoptedWhite:
-    """Return D65, the light of a picture file that states none; reference light states its own lamps."""
+    """Return D65 as the light of a picture file, with a note that it is assumed; none for reference light."""
     use = "it is lit by" if is_reflectance(path) else f"{_SMOOTH}; its colours are judged under"
     note = f"{Path(path).name}: {use} {LIGHT}; give another light where that isn't so"
     return AdoptedWhite(illuminant(LIGHT), () if is_reference(path) else (note,))
@@ -161,12 +161,13 @@ def default_white(path: str | Path) -> AdoptedWhite:
 def file_white(path: str | Path, light: str | None) -> AdoptedWhite:
     """Return the light under which a picture file is seen: `light` if it is given, else the file's own, else D65.
 
-    A given light replaces the illuminant that an ISETCam scene holds, and is the lamp behind a file that states none.
+    A given light replaces the illuminant that an ISETCam scene states. For a file that states none it is the light that
+    the file is assumed to have.
 
     Raises
     ------
     InputError
-        For an unknown light, or a ``.mat`` that can't be read.
+        For an unknown light, or a ``.mat`` file that can't be read.
     """
     given = None if light is None else illuminant(light)
     stored = stored_illuminant(path)
@@ -192,7 +193,7 @@ def open_radiance_file(path: str | Path, white: AdoptedWhite, spectra: str = SUR
     Parameters
     ----------
     white : AdoptedWhite
-        Light of the file's reflectances.
+        Light that illuminates a file of reflectances.
     spectra : str
         How a photograph's colours become spectra, as in `render.radiance_files.photo.read_photo`.
 

@@ -37,7 +37,7 @@ from studies.study.levels import check_known, check_rendered_range, parse_exposu
 from studies.study.model import LensTerms
 from studies.study.motion import check_moving
 
-OWN = "own"  # stands for the spectra of the scene's own lights
+OWN = "own"  # value of `spectra` that keeps the spectra of the scene's own lights
 MOST_FRAMES = 64
 # The neutral of the scene's light, which a camera notes in its raw files; or Gray World, found in the picture.
 WHITE_BALANCES = AS_SHOT, GRAY_WORLD = "as-shot", "gray-world"
@@ -186,7 +186,7 @@ class BudgetShares:
 
 @dataclass(frozen=True)
 class Condition:
-    """A place in the study's grid: all that decides the expected electrons but for the mosaic.
+    """A place in the study's grid: all that decides the expected electrons, except the mosaic.
 
     Attributes
     ----------
@@ -200,11 +200,11 @@ class Condition:
     sensor : str
         Preset by name, or a ``.toml`` file.
     white_balance : str
-        Of `WHITE_BALANCES`.
+        One of `WHITE_BALANCES`.
     frames : int
-        Exposures, each of that time, that are merged before they are developed.
+        Number of exposures, each of that time, that are merged before they are developed.
     gain : str
-        ``own``, the sensor's, which a rule of exposure may raise; a factor such as ``8``, or ``ISO 400``.
+        ``own``, the sensor's gain, which a rule of exposure may raise; a factor such as ``8``; or ``ISO 400``.
     """
 
     scene: SceneChoice
@@ -289,7 +289,7 @@ class Study:
 
     @property
     def gain_texts(self) -> tuple[str, ...]:
-        """Return the values of the axis of gains, as `Condition` has them."""
+        """Return the values of the axis of gains, as texts for `Condition`."""
         texts = [gain_text(gain, None) for gain in self.gains] + [gain_text(None, iso) for iso in self.isos]
         return tuple(texts) or (OWN,)
 
@@ -302,19 +302,19 @@ class Study:
 
 
 def default_balance(processor: str) -> str:
-    """Return a processor's white balance if none is stated: Gray World for the paper's method, as shot for others."""
+    """Return a processor's white balance where a study states none: Gray World for the paper's method, else as shot."""
     return GRAY_WORLD if processor == PAPER_METHOD else AS_SHOT
 
 
 def conditions(study: Study, scene: SceneChoice | None = None) -> list[Condition]:
-    """Return all combinations of the scenes (or one) and of the axes of a picture; the last varies fastest."""
+    """Return all conditions of a study, or of one of its scenes; the last axis varies fastest."""
     scenes = study.scenes if scene is None else (scene,)
     camera = study.exposures, study.sensors, study.white_balances, study.frames, study.gain_texts
     return [Condition(*place) for place in product(scenes, study.spectra, study.levels, *camera)]
 
 
 def most_spp(study: Study, scene: SceneChoice) -> int:
-    """Return the most samples per pixel of a scene."""
+    """Return the most samples per pixel that a scene's render may have."""
     return scene.spp or study.render.spp
 
 
@@ -333,7 +333,7 @@ def label(value: object) -> str:
 
 
 def _check_axes(study: Study) -> None:
-    """Check that each axis has values of its own, and that levels, times, seeds and lights are known."""
+    """Check that no axis is empty or repeats a value, and that levels, times, seeds and lights are valid."""
     for name in _LISTS:
         values = getattr(study, name)
         labels = [value.label if isinstance(value, SceneChoice) else label(value) for value in values]
@@ -365,7 +365,7 @@ def _check_axes(study: Study) -> None:
 
 
 def _check_gains(study: Study) -> None:
-    """Check gains or speeds, and that every sensor has them."""
+    """Check that gains or speeds are given, not both, each once, and that every sensor has them."""
     for name in _GAINS:
         for value in getattr(study, name):
             require_range(name, None if isinstance(value, bool) else value, 1e-3, 1e9, "give factors or speeds above 0")
@@ -380,7 +380,7 @@ def _check_gains(study: Study) -> None:
 
 
 def _check_cameras(study: Study) -> None:
-    """Check white balances and processors, and sensors with the mosaics that these take."""
+    """Check white balances, processors, and each sensor with the mosaics that the processors develop."""
     require_keys("white_balances", study.white_balances, WHITE_BALANCES)
     for name in study.processors:
         require_consent("processors", name, study.trust_code)

@@ -1,4 +1,4 @@
-"""Studies as TOML files, read strictly: a misspelt key is an error, not a night of computing lost."""
+"""Read studies from TOML files, strictly: a misspelt key is an error, so that it doesn't waste a night of computing."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -26,14 +26,14 @@ def read_study(path: str | Path, changes: Sequence[str] = (), *, trust_code: boo
         TOML with the fields of `Study`; names of files in it are relative to its folder. Where no such file is, a name
         of `EXAMPLES`.
     changes : sequence of str
-        ``key=value`` such as ``render.spp=64``, the value in TOML's notation, in place of the file's own.
+        ``key=value`` such as ``render.spp=64``, with the value in TOML's notation; it replaces the file's own value.
     trust_code : bool
         Consent to run the user's own Python files among the processors; the study file itself can't give it.
 
     Raises
     ------
     InputError
-        For a file that can't be read, an unknown key (the likely one is named), or a value that isn't allowed.
+        For a file that can't be read, an unknown key (the message names a similar one), or a value that isn't allowed.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def read_study(path: str | Path, changes: Sequence[str] = (), *, trust_code: boo
 
 
 def _set(content: dict[str, Any], change: str) -> None:
-    """Put one ``key=value`` into the content; a value that isn't TOML is taken as a text."""
+    """Write one ``key=value`` into the content; a value that isn't TOML is used as a text."""
     key, equals, text = change.partition("=")
     if not equals or not key:
         raise InputError(f"set: {change!r} is not allowed; write KEY=VALUE, such as render.spp=64")
@@ -93,7 +93,7 @@ def _set(content: dict[str, Any], change: str) -> None:
 
 
 def _beside(value: Any, folder: Path) -> Any:
-    """Return an axis's value with the paths of its files, whose names are relative to the study's folder."""
+    """Return an axis's value in which names of files, which are relative to the study's folder, become paths."""
     if isinstance(value, list):
         return [_beside(item, folder) for item in value]
     if isinstance(value, dict):
@@ -112,7 +112,7 @@ def _scene(value: object, _: object) -> SceneChoice:
 
 
 def _axis(kind: object) -> Callable[[Any, Any], Any]:
-    """Return a hook that reads a tuple, in which one value may stand for a list of one."""
+    """Return a hook that reads a list into a tuple; a single value is read like a list with one value."""
     item = get_args(kind)[0]
     return lambda value, _: tuple(
         _CONVERTER.structure(entry, item) for entry in (value if isinstance(value, list) else [value])
