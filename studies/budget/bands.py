@@ -1,4 +1,4 @@
-"""Merge a render's fine bands into fewer, wider ones: what a render in those would give, without another render."""
+"""Merge a render's fine bands into fewer, wider ones, which shows without another render what those would give."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,14 +19,14 @@ COUNTS = (4, 8, 12, 16, 20, 28, 40)
 
 
 def possible_counts(width_nm: Floats) -> tuple[int, ...]:
-    """Return the numbers of bands that a plan may choose; where the range is wider, also all of its fine bands."""
+    """Return the numbers of bands that a plan may choose; a wider range may also keep all of its fine bands."""
     return (*COUNTS, width_nm.size) if width_nm.size > COUNTS[-1] else COUNTS
 
 
 def band_groups(width_nm: Floats, count: int) -> list[NDArray[np.intp]]:
     """Divide the fine bands into about `count` groups of neighbours, as equal as they can be; return their indices.
 
-    The narrow band of a line is a group of its own, so that lamps with lines have some more.
+    The narrow band of a lamp's line is a group of its own, so lamps with lines have more groups than `count`.
     """
     size = width_nm.size / min(count, width_nm.size)
     narrow = width_nm < FINE_NM / 4
@@ -76,7 +76,7 @@ def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) ->
 
 
 def merge_radiance(radiance: SpectralRadiance, groups: Sequence[NDArray[np.intp]]) -> SpectralRadiance:
-    """Average radiance over wide bands, as if light and scene were followed exactly within each of them."""
+    """Average exact radiance over wide bands: what a render would give that made no error within a band."""
     nm, width_nm = wide_bands(radiance.wavelength_nm, radiance.widths_nm, groups)
     values = radiance.values @ _means(radiance.widths_nm, groups).T.astype(radiance.values.dtype)
     return replace(radiance, values=values, wavelength_nm=nm, width_nm=width_nm)

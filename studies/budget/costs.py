@@ -1,4 +1,4 @@
-"""Cost of a model in stated nanoseconds of one core per pixel, so that a plan is the same on every machine.
+"""Estimate a model's cost from stated nanoseconds of one core per pixel, so that every machine makes the same plan.
 
 Only their ratios count. `still_life` at 256x256 takes 1690, 2370 and 4410 ns per pixel and sample in 8, 16 and 40
 bands: 85 ns per band, and as much as 12 bands to trace a path.
@@ -29,7 +29,7 @@ def image_ns(bands: int, modelled: Iterable[str]) -> float:
 
 
 def cost_over_reference(plan: Plan, reference: Plan, scene: SceneChoice) -> float:
-    """Return the estimated time of a scene's render and images over that of the reference's."""
+    """Return the estimated time of a scene's render and images over the time that the reference's would take."""
     planned_ns, reference_ns = (_scene_ns(model, plan, scene) for model in (plan, reference))
     return planned_ns / reference_ns
 

@@ -1,8 +1,9 @@
-"""What each approximation does to a picture, in electrons, found on a small pilot render.
+"""Find on a small pilot render what each approximation changes in a picture, in electrons.
 
-Everything is linear in light and time, so it is found once for 1 cd/m^2 and 1 s and scaled. Each effect is computed
-from the pilot's even and from its odd half: the product of the two has the effect's square as its mean, free of Monte
-Carlo noise. That noise is drawn anew from the variance, and goes through the lens as the light does.
+All changes are linear in light and time, so they are found once for 1 cd/m^2 and 1 s, and scaled. Each is computed
+twice, from the even and from the odd half of the pilot's samples. The mean product of the two is the mean square of the
+change, free of Monte Carlo noise. Monte Carlo noise itself is drawn from the pilot's variance, and imaged by the lens
+as the light is.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,11 +24,11 @@ Pair = NDArray[np.float64]  # (2, h, w): electrons from the even and from the od
 
 DIFFRACTION = "diffraction"
 IMAGING_TERMS = {DIFFRACTION: "diffraction", "veiling glare": "veiling_glare", "cos^4": "horizontal_view_deg"}
-KERNEL = "kernel"  # name of the error of the fast readout, which replaces the exact one
+KERNEL = "kernel"  # name of the error that the fast readout makes in comparison with the exact one
 SHAKE = "camera shake"  # the only effect of the lens that depends on the exposure time
 LENS_TERMS = IMAGING_TERMS | {SHAKE: "shake_um"}
 DRAWS = 2  # number of draws of Monte Carlo noise
-PATHS = 8  # number of paths of a shaking camera that are tried
+PATHS = 8  # number of random paths of a shaking camera that are tried
 SINGLE_EPSILON = 2.0**-24  # largest relative rounding error of one operation in single precision
 NORMAL_REACH = 6.7  # standard deviations at which `sensor.kernel.kernel.normal_pair` ends
 
@@ -39,13 +40,13 @@ class BandErrors:
     Attributes
     ----------
     response : (2, h, w) float64
-        Error because light and response vary together within a band: exact radiance averaged over wide bands, less that
-        in fine bands.
+        Error because light and response vary together within a band: electrons of the exact radiance averaged over wide
+        bands, less those in fine bands.
     light : (2, h, w) float64
-        Error because the light and what the scene does with it vary together within a band: the product of their
-        averages, less the average of their product.
+        Error because the lamp's spectrum and the scene's transport vary together within a band: electrons of the
+        product of their averages, less those of the average of their product.
     jitter : (h, w) float64
-        Variance of one path's electrons because it draws its wavelengths within the bands at random.
+        Variance of one path's electrons because its wavelengths within the bands are random.
     """
 
     response: Pair
@@ -62,12 +63,12 @@ class Effects:
     full : (2, h, w) float64
         Electrons with everything modelled, in fine bands.
     blurred, sharp : (draw, h, w) float64
-        Draws of the pilot's Monte Carlo noise, with diffraction and without. Diffraction evens noise out, but it also
-        carries noise from the rim of a lamp to pixels below saturation.
+        Draws of the pilot's Monte Carlo noise, with diffraction and without. Diffraction smooths noise, but it also
+        spreads noise from the rim of a lamp to pixels below saturation.
     lens : mapping of str to (2, h, w) float64
         Change when one term of the lens is left out.
     bands : mapping of int to BandErrors
-        Errors by the count of `studies.budget.bands.COUNTS`.
+        Errors for each number of bands in `studies.budget.bands.COUNTS`.
     """
 
     full: Pair
@@ -86,7 +87,7 @@ def find_effects(
 ) -> Effects:
     """Find all effects for a sensor under the transport's own spectra.
 
-    They are the effects on the light. Crosstalk is left out: it spreads an effect as it spreads charge, and makes no
+    They are effects on the collected light, before crosstalk: that spreads an effect as it spreads charge, and makes no
     mean square larger.
 
     Parameters
@@ -95,7 +96,7 @@ def find_effects(
         The pilot, in fine bands.
     sensor : SensorConfig
     lens : LensConfig
-        The lens with everything that the reference models.
+        The lens with all of its effects, as the reference models it.
     groups : mapping of int to sequence of index arrays
         Choices of wide bands, as `studies.budget.bands.band_groups` makes them.
     rng : numpy.random.Generator
@@ -122,7 +123,7 @@ def find_effects(
 def shake_effect(
     transport: Transport, sensor: SensorConfig, lens: LensConfig, exposure_s: float, rng: np.random.Generator
 ) -> Pair:
-    """Return the change if camera shake is left out, as in `Effects.lens`, for the path of `PATHS` with the most."""
+    """Return the change if camera shake is left out, as in `Effects.lens`, for the worst of `PATHS` random paths."""
     halves = transport.relight_halves(luminance_cd_m2=1.0)
     held = replace(sensor, lens=lens)
     still = [imaged_electrons(half, held, 1.0) for half in halves]
@@ -134,10 +135,10 @@ def shake_effect(
 
 
 def kernel_rms_e(expected_e: NDArray[np.float64], bands: int) -> NDArray[np.float64]:
-    """Bound the error of the fast readout's expected electrons, (h, w); a bound, because a machine may lack Dr.Jit.
+    """Return a bound on the fast readout's error in each pixel's mean, (h, w) [e-]; Dr.Jit isn't needed for it.
 
-    A sum over bands in single precision rounds bands + 2 times. A draw's distribution function is off by at most
-    `LARGEST_ERROR`, and so is its mean by that times the width of the distribution.
+    A sum over bands in single precision rounds bands + 2 times. The distribution function of a draw is off by at most
+    `LARGEST_ERROR`, so the draw's mean is off by at most that times the width of the distribution.
     """
     rounding = (bands + 2) * SINGLE_EPSILON * expected_e
     return np.asarray(rounding + LARGEST_ERROR * 2 * NORMAL_REACH * np.sqrt(expected_e))
@@ -165,7 +166,7 @@ def _band_errors(
     groups: Sequence[NDArray[np.intp]],
 ) -> BandErrors:
     averaged = [merge_radiance(half, groups) for half in halves]
-    # A level is reached by the luminance that the wide bands compute, whose error is therefore counted here.
+    # A study scales its light to a level by the luminance in wide bands, so the error of that luminance counts here.
     mean = SpectralRadiance(
         transport.mean_radiance(luminance_cd_m2=1.0)[None, None],
         transport.wavelength_nm,
@@ -180,9 +181,9 @@ def _band_errors(
 def _jitter(
     halves: Sequence[SpectralRadiance], sensor: SensorConfig, groups: Sequence[NDArray[np.intp]]
 ) -> NDArray[np.float64]:
-    """Return the variance of the electrons over the wavelengths within wide bands that a path may draw, shape (h, w).
+    """Return the variance of a path's electrons over the wavelengths that it may draw within wide bands, shape (h, w).
 
-    All bands are varied together, because a path draws one offset for all of them.
+    All bands vary together, because a path draws one offset for all of them.
     """
     positions = max(len(group) for group in groups)
     if positions == 1:

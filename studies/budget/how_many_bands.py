@@ -1,4 +1,4 @@
-"""The third decision: how many bands a render has, each number with the effects and the samples that go with it."""
+"""The third decision: how many bands a render has. Each number is compared with its own best effects and samples."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ class Choice:
     Attributes
     ----------
     count : int
-        Number of bands as it is asked for; lines of lamps add some.
+        Number of bands before those of the lamps' lines are added.
     spp : int
         Samples per pixel; 0 for a picture file.
     left_out : dict of Condition to frozenset of str
@@ -33,15 +33,15 @@ class Choice:
 def choose(rows: Sequence[ScaledEffects], sizes: dict[int, int], shares: BudgetShares, most_spp: int) -> Choice:
     """Choose the cheapest model of one scene: one render for all conditions, and a lens for each.
 
-    Monte Carlo noise has a share of its own; the rest is for all other errors together. Sensors and mosaics that see
-    the same light for the same time are compared, so what one of them needs, all have. The finest bands with every
-    effect modelled are within any share.
+    Monte Carlo noise has its own share of the budget, and all other errors together have the rest. Sensors and mosaics
+    that see the same light for the same time are compared with each other, so an effect that one of them needs is
+    modelled for all. The finest bands with every effect modelled are always allowed.
 
     Parameters
     ----------
     rows : sequence of ScaledEffects
     sizes : dict of int to int
-        Real number of bands by the number asked for.
+        For each `Choice.count`, the number of bands with those of the lamps' lines.
     shares : BudgetShares
     most_spp : int
         Samples per pixel that the study allows; 0 for a picture file.

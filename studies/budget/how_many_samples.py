@@ -6,7 +6,8 @@ from math import ceil
 from studies.budget.scaled_effects import ScaledEffects
 from studies.study.study import BudgetShares, Condition
 
-FEWEST_SPP = 128  # with fewer, samples are spread less evenly than the pilot's, from which their noise is predicted
+# Fewer samples are spread less evenly than those of the pilot, so that its noise wouldn't predict theirs.
+FEWEST_SPP = 128
 
 
 def samples_per_pixel(

@@ -13,14 +13,14 @@ from studies.study.study import Condition, SceneChoice, label
 
 MONTE_CARLO, LEVEL = "Monte Carlo", "level"
 RESPONSE, LIGHT = "bands", "light within bands"
-LEAST_SHOWN = 1e-3  # share of the noise variance under which a text leaves a term out
+LEAST_SHOWN = 1e-3  # a term below this share of the noise variance isn't written out
 
 
 @dataclass(frozen=True)
 class Term:
     """One approximation's error: RMS over pixels below saturation [e-], and its square over the noise variance.
 
-    A `modelled` term states what leaving it out would cost, and adds nothing to the total.
+    If the effect is `modelled`, the term states the error that leaving it out would make; it isn't in the total.
     """
 
     name: str
@@ -41,9 +41,9 @@ class Ledger:
         Exposure time, and the sensor's own noise: the root of its mean variance [e-].
     terms : tuple of Term
     rms_e, share : float
-        Error of all terms together. The noise of the render and of its level is independent of the other errors and
-        adds in square. The others may have the same sign; the RMS of a sum is at most the sum of the RMS (Minkowski's
-        inequality).
+        Error of all terms together. The noise of the render and of its level is independent of the other errors, so its
+        square is added. The other errors may have the same sign, so their RMS values are added: the RMS of a sum is at
+        most that (Minkowski's inequality).
     """
 
     condition: Condition
@@ -56,7 +56,7 @@ class Ledger:
 
 
 def ledger(effects: ScaledEffects, count: int, spp: int, left_out: frozenset[str]) -> Ledger:
-    """List the errors of one model: its bands, samples per pixel (0 for a picture file) and the effects left out."""
+    """List a model's errors: those of its bands, samples per pixel (0 for a picture file) and effects left out."""
     noise_e2 = effects.noise_variance
     monte_carlo = effects.monte_carlo(count, spp, left_out) if spp else 0.0
     level = effects.level / spp if spp else 0.0
@@ -95,7 +95,7 @@ def condition_words(row: Ledger) -> tuple[str, ...]:
 
 
 def term_names(ledgers: Sequence[Ledger]) -> list[str]:
-    """Return the names of all terms; a picture file lacks some that a scene has."""
+    """Return the names of all terms in order; a ledger may lack some that another one has."""
     longest_first = sorted(ledgers, key=lambda row: -len(row.terms))
     return list(dict.fromkeys(term.name for row in longest_first for term in row.terms))
 

@@ -29,7 +29,7 @@ from studies.study.model import unit_exposure_s
 from studies.study.scene_source import open_radiance_file
 from studies.study.study import OWN, Study, conditions, most_spp, study_mosaics
 
-PILOT_SIDE = 64  # pixels of a pilot's longer side; fewer pixels make a picture no smoother, so no effect smaller
+PILOT_SIDE = 64  # pixels of a pilot's longer side; at fewer pixels no effect is smaller, because detail is coarser
 FILE_SIDE = 128  # pixels of the longer side of a picture file's pilot, which costs no render
 PILOT_SEED = 1 << 32  # added to the study's seed, so that pilots share no samples with renders, nor files in the cache
 PILOT_SPP = 128
@@ -85,7 +85,7 @@ def make_pilot(opened: OpenedScene, study: Study, counts: Iterable[int], cache: 
 def _in_blocks(transport: Transport, side: int) -> Transport:
     """Average blocks of `side` x `side` pixels into one; blocks at the far borders are smaller.
 
-    The means that levels are computed from stay those of the whole picture.
+    The means from which levels are computed stay those of the whole picture.
     """
     if side == 1:
         return transport
@@ -144,7 +144,7 @@ def scaled_effects_of(pilot: Pilot, study: Study) -> Iterator[ScaledEffects]:
             camera_alone = study.lens.behind(preset(name))
             auto_s = unit_exposure_s(radiance, camera_alone.undivided)
             for mosaic in study_mosaics(study):
-                sensor = vary(camera_alone, mosaic).undivided  # because a pilot is coarser anyway
+                sensor = vary(camera_alone, mosaic).undivided  # the pilot's pixels are coarser than photodiodes anyway
                 lens = full_lens(study, sensor.lens, pilot.opened)
                 sensor = replace(sensor, lens=lens)
                 of_any_time = find_effects(lit, sensor, lens, pilot.groups, rng)
@@ -167,7 +167,7 @@ def scaled_effects_of(pilot: Pilot, study: Study) -> Iterator[ScaledEffects]:
 
 
 def _pilot_noise(pilot: Pilot, lit: Transport) -> PilotNoise:
-    """Return the Monte Carlo noise of the pilot; a picture file states none."""
+    """Return the Monte Carlo noise of the pilot; none is known for a picture file."""
     if not pilot.rendered:
         return PilotNoise(spp=0, half_spp=1, level=0.0)
     fewer = lit.coverage.mean.size / (pilot.opened.size[0] * pilot.opened.size[1])

@@ -1,4 +1,4 @@
-"""The error budget of a study: what its pictures have to hold, and what the sensor's noise hides."""
+"""The error budget of a study: which effects its pictures have to model, and which the sensor's noise hides."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,17 +27,18 @@ def plan(study: Study, *, cache: str | Path | None = None, step: Step | None = N
     Parameters
     ----------
     study : Study
-        `budget` holds the shares and the starting point, `lens` what the lens does in full, `render.spp` the most
-        samples. The shares are those of the unbiased light: what a denoiser leaves isn't known before the render.
+        Its `budget` holds the shares and the starting point, `lens` all effects of the lens, `render.spp` the most
+        samples. The shares are for unbiased light, because the error of denoised light isn't known before the render.
     cache : str or Path, optional
         Folder of renders.
     step : callable, optional
-        Called with what is being done and the share that is done; a notebook shows a bar for each pilot's render.
+        Function that is called with what is being done and the share that is done; left out, a notebook shows a bar for
+        each pilot's render.
 
     Returns
     -------
     Plan
-        The same for the same study, whatever the machine's speed. Picture files have no entry in `renders`.
+        The plan. It depends on the study alone, not on the machine's speed. Picture files have no entry in `renders`.
 
     Raises
     ------
@@ -81,7 +82,7 @@ def plan(study: Study, *, cache: str | Path | None = None, step: Step | None = N
 
 
 def _chosen_models(choice: Choice, pilot: Pilot, study: Study) -> Plan:
-    """Return the models of one scene that hold what was chosen."""
+    """Return the models of one scene's render and images that follow from a choice."""
     images = {}
     for condition, left_out in choice.left_out.items():
         lens = full_lens(study, preset(condition.sensor).lens, pilot.opened)
@@ -93,7 +94,7 @@ def _chosen_models(choice: Choice, pilot: Pilot, study: Study) -> Plan:
 
 
 def _choice_of(named: Plan, rows: Sequence[ScaledEffects], pilot: Pilot) -> Choice:
-    """Return a starting point's choice for a pilot's scene; the pilot has one number of bands, the starting point's."""
+    """Return a starting point's choice for a pilot's scene; the pilot was made with that one number of bands."""
     (count,) = pilot.groups
     left_out = {}
     for row in rows:

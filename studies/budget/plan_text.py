@@ -10,7 +10,7 @@ from studies.budget.effects import LENS_TERMS
 from studies.budget.ledger import LEAST_SHOWN, MONTE_CARLO, Plan, Term, condition_words, figures, term_names
 from studies.study.study import SceneChoice, Study
 
-LEVEL = 2  # place of the level in a condition's words
+LEVEL = 2  # index of the level in `studies.budget.ledger.condition_words`
 TABLE_LEGEND = (
     "Each figure is a share of the sensor's own noise variance: an upper estimate from a small pilot render. A figure "
     "in brackets is of an effect that is modelled, and tells what leaving it out would cost."
@@ -18,7 +18,7 @@ TABLE_LEGEND = (
 
 
 def plan_json(study: Study, plan: Plan, reference: Plan) -> dict[str, Any]:
-    """Return everything that a plan holds, as JSON takes it."""
+    """Return everything that a plan holds, in types that JSON has."""
     images = {
         condition: {field: getattr(model.lens, field) for field in LENS_TERMS.values()} | {"exact": model.exact}
         for condition, model in plan.images.items()
@@ -77,6 +77,6 @@ def plan_table(plan: Plan) -> Table:
 
 
 def worst(plan: Plan, scene: SceneChoice, name: str) -> Term:
-    """Return the largest term of a name over a scene's conditions."""
+    """Return the largest of the terms called `name` over a scene's conditions."""
     terms = [term for row in plan.ledgers if row.condition.scene == scene for term in row.terms if term.name == name]
     return max(terms, key=lambda term: term.share)

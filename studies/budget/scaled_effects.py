@@ -1,4 +1,4 @@
-"""A sensor's effects at one level and exposure time, in electrons: all that the budget's decisions are made of."""
+"""The errors of approximations at one level and exposure time, in electrons; the budget's decisions use only these."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ from sensor.readout import light_variance
 from studies.budget.effects import DIFFRACTION, Effects, Pair, kernel_rms_e
 from studies.study.study import Condition
 
-# Standard errors that are added to a mean over the pilot's pixels. A few pixels may hold most of the noise, in the
-# pilot and in the render that is predicted. Whatever its distribution, at most 5 % of such means are too low by more
-# than the root of 19 standard errors (Cantelli's inequality).
+# So many standard errors are added to a mean over the pilot's pixels, because chance may make it too low. A few pixels
+# may hold most of the noise, in the pilot and in the predicted render. Whatever the noise's distribution, at most 5 %
+# of such means are too low by more than the root of 19 standard errors (Cantelli's inequality).
 EFFECT_MARGIN = 2.0
 NOISE_MARGIN = 19.0**0.5
 
@@ -28,7 +28,7 @@ class PilotNoise:
     spp, half_spp : float
         Samples per pixel of the pilot, and of one of its halves.
     level : float
-        Relative variance of the picture's mean luminance, for one sample per pixel and the render's number of pixels.
+        Relative variance of the picture's mean luminance if the whole render had one sample per pixel.
     """
 
     spp: float
@@ -46,17 +46,19 @@ class ScaledEffects:
     mosaic : str
     exposure_s : float
     noise_variance : float
-        The sensor's own, mean over pixels below saturation [e-^2].
+        The sensor's own noise variance, as mean over the pixels below saturation [e-^2].
     blurred, sharp : float
-        Monte Carlo variance of one sample per pixel, with diffraction and without [e-^2].
+        Monte Carlo variance at one sample per pixel, with diffraction and without [e-^2].
     jitter : mapping of int to float
-        Variance of one sample per pixel by the wavelengths that it draws within bands, by number of bands [e-^2].
+        For each number of bands, the variance at one sample per pixel because a path's wavelengths within the bands are
+        random [e-^2].
     level : float
-        Variance by the mean luminance that a level scales the picture by, of one sample per pixel [e-^2].
+        Variance at one sample per pixel because the mean luminance, by which a picture is scaled to its level, is noisy
+        [e-^2].
     bands : mapping of int to (float, float)
-        Error of the response and of the light within bands, by number of bands.
+        For each number of bands, the errors `BandErrors.response` and `BandErrors.light`.
     lens : mapping of str to float
-        Error of leaving an effect of the lens out.
+        Error if an effect of the lens is left out, by its name.
     kernel : float
         Error of the fast readout.
     """
@@ -100,7 +102,7 @@ def scale_effects(
     pilot : PilotNoise
     """
     scale = level_cd_m2 * exposure_s
-    # Beside a lamp a lens that is sampled once per pixel undershoots below 0, where `form_image` gives no light.
+    # Next to a lamp the image of a lens that is sampled once per pixel falls below 0; `form_image` replaces that by 0.
     expected_e = scale * np.maximum(effects.full.mean(axis=0), 0.0)
     readings = resolve(sensor, expected_e, exposure_s)
     below = unsaturated(expected_e, readings)
@@ -108,7 +110,7 @@ def scale_effects(
     noise_e2 = _mean(light_variance(expected_e, readings)[below]) or 1.0
     blurred, sharp = effects.blurred**2 * pilot.spp, effects.sharp**2 * pilot.spp
     # Wavelengths are stratified within a half, and the light that a path carries is independent of its wavelength.
-    # Signal and noise are those before diffraction, and a pixel without light has neither noise nor jitter.
+    # Signal and noise are taken before diffraction; a pixel without light then has neither noise nor jitter.
     signal = (effects.full + effects.lens.get(DIFFRACTION, 0.0)).mean(axis=0)
     relative = np.divide(sharp.mean(axis=0), signal**2, out=np.zeros_like(signal), where=signal > 0)
     spread = relative + 1 / pilot.half_spp
@@ -137,7 +139,7 @@ def _rms(pair: Pair, below: NDArray[np.bool_]) -> float:
     """Return an effect's root mean square over the pixels of the mask `below`, raised by a margin against chance.
 
     The square is estimated without bias as the product of the effect's two estimates, from the even and the odd half.
-    The margin allows for a mean that comes out too small by chance because there are few pixels.
+    The margin is needed because there are few pixels, so that their mean may be too small by chance.
     """
     return float(np.sqrt(max(_upper((pair[0] * pair[1])[below], EFFECT_MARGIN), 0.0)))
 

@@ -1,6 +1,6 @@
 """Models that a study asks for by name, in place of the one that a plan chooses by itself.
 
-``fast`` is for a first look, ``default`` takes the study and its sensors as they are stated, and ``reference`` models
+``fast`` is for a first look, ``default`` uses exactly what the study and its sensors state, and ``reference`` models
 everything.
 """
 
@@ -17,7 +17,7 @@ from studies.study.model import ImageModel, in_bands
 from studies.study.study import DEFAULT, FAST, OWN, REFERENCE, Study, conditions, most_spp
 
 FAST_BANDS, FAST_SPP = 8, 128
-REFERENCE_SAMPLES = 4  # times the samples that the study allows, so that the reference has at most half of its noise
+REFERENCE_SAMPLES = 4  # the reference has this many times the study's most samples, so at most half of its noise
 MOST_SPP = 1 << 16
 
 
@@ -27,7 +27,7 @@ def starting_point(study: Study, name: str) -> Plan:
 
 
 def fast_plan(study: Study) -> Plan:
-    """Plan few bands and samples, the fast readout, and of the lens only what the study itself states."""
+    """Plan few bands and samples, the fast readout, and only those effects of the lens that the study itself states."""
     renders, images = {}, {}
     for opened in open_all(study).values():
         if opened.scene is not None:
@@ -66,7 +66,7 @@ def reference_plan(study: Study) -> Plan:
 
 
 def band_count(study: Study, name: str, opened: OpenedScene) -> int:
-    """Return the number of bands that a starting point asks for; lines of lamps add some."""
+    """Return a starting point's number of bands, before those of the lamps' lines are added."""
     if name == FAST:
         return FAST_BANDS
     if name == DEFAULT:

@@ -1,4 +1,4 @@
-"""What a plan leaves out, what that costs and what it saves: a paragraph of plain sentences for each scene."""
+"""Write a paragraph for each scene: what its plan leaves out, which error that makes, and how much time it saves."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -71,7 +71,7 @@ def _of(count: int, every: int) -> str:
 
 
 def _cost(study: Study, rows: Sequence[Ledger]) -> list[str]:
-    """Say how large the error is where it is largest, and what it is made of."""
+    """Say how large the error is in the worst condition, and which terms it consists of."""
     worst = max(rows, key=lambda row: row.share)
     parts = sorted((term for term in worst.terms if not term.modelled), key=lambda term: -term.share)
     made_of = f"{parts[0].name} ({share_text(parts[0].share)}) and {parts[1].name} ({share_text(parts[1].share)})"
@@ -89,7 +89,7 @@ def _share(share: float) -> str:
 
 
 def _too_few_samples(study: Study, spp: int, rows: Sequence[Ledger]) -> list[str]:
-    """Say how many samples would do where Monte Carlo noise exceeds its share."""
+    """Say how many samples would be enough if Monte Carlo noise exceeds its share of the budget."""
     share = max(term.share for row in rows for term in row.terms if term.name == MONTE_CARLO)
     if share <= study.budget.monte_carlo:
         return []

@@ -1,6 +1,7 @@
-"""The first decision: which effects of the lens and of the readout a picture holds.
+"""The first decision: which effects of the lens and of the readout a picture includes.
 
-An effect may be left out where the sensor's noise hides it. Of all subsets that fit the budget the cheapest is taken.
+An effect may be left out if the sensor's noise hides it. Of all sets of effects that fit the budget the cheapest is
+chosen.
 """
 
 from collections.abc import Iterable, Sequence
@@ -20,15 +21,16 @@ def effects_left_out(
     Parameters
     ----------
     rows : sequence of ScaledEffects
-        Effects on the sensors and mosaics that are compared with each other, so that all of them have one lens.
+        Effects on the sensors and mosaics that are compared with each other, and therefore have one lens.
     count, bands : int
-        Number of bands as it is asked for, and as it is with the lines of lamps.
+        Number of bands without and with those of the lamps' lines.
     shares : BudgetShares
 
     Returns
     -------
     float, frozenset of str
-        Cost of what is modelled [ns per pixel], and what is left out. None where the bands alone exceed the budget.
+        Cost of the modelled effects [ns per pixel], and the effects left out. None if the bands alone exceed the
+        budget.
     """
     names = [*dict.fromkeys(name for row in rows for name in row.lens), KERNEL]
     subsets = (frozenset(some) for size in range(len(names) + 1) for some in combinations(names, size))
@@ -43,7 +45,7 @@ def effects_left_out(
 def _fits(row: ScaledEffects, count: int, left_out: Iterable[str], shares: BudgetShares) -> bool:
     """Return whether the errors of the bands and of the effects left out stay within the budget.
 
-    Their part of the budget is what remains of it after the share of Monte Carlo noise.
+    The budget for them is what the share of Monte Carlo noise leaves of the total.
     """
     optional_e = {**row.lens, KERNEL: row.kernel}
     error_e = sum(row.bands[count]) + sum(optional_e.get(name, 0.0) for name in left_out)

@@ -1,4 +1,4 @@
-"""Answers: pictures of one or two cameras; figures, files and Python of one."""
+"""Answer the page's questions: pictures for one or two cameras; figures, files and Python for one."""
 
 import sys
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ Answer: TypeAlias = tuple[Header, Sequence[bytes]]
 
 
 def written(message: Header, controls: Controls, rendered: RenderState, memo: Memo, drops: Path) -> Answer:
-    """Answer with figures and files of one camera."""
+    """Answer a message with a figure or a file of one camera."""
     kind = message["kind"]
     if kind == "dng":
         return {"name": "explored.dng"}, (_dng(rendered, controls, memo),)
@@ -48,7 +48,7 @@ def written(message: Header, controls: Controls, rendered: RenderState, memo: Me
 def shown(
     cameras: Sequence[Controls], views: Sequence[tuple[int, str]], rendered: RenderState, memo: Memo, drops: Path
 ) -> tuple[Header, list[Bytes], bool]:
-    """Return the header and pictures of each view, and whether a slow processor is left for later."""
+    """Return a header, a picture for each view, and whether the result of a slow processor is still missing."""
     shots, used = [], []
     for controls in cameras:
         exposed = expose_scene(rendered.transport, controls, memo)
@@ -79,7 +79,7 @@ def shown(
 
 
 def _shot(controls: Controls, exposed: Exposure, memo: Memo) -> Shot | None:
-    """Develop an exposure; None where its processor is slow and has no result yet."""
+    """Develop an exposure; return None if its processor is slow and has no result yet."""
     if stand_in(controls, exposed.raw.dn.size) == controls:
         development = development_of(exposed, controls, memo)
         memo.check()
@@ -95,21 +95,21 @@ def _shot(controls: Controls, exposed: Exposure, memo: Memo) -> Shot | None:
 
 
 def python_text(rendered: RenderState, controls: Controls, view: str, drops: Path) -> str:
-    """Write the Python of a view or a figure; it names a dropped file without folder, to be run beside that file."""
+    """Write the Python that makes a view or a figure; it expects a dropped sensor's file in its working folder."""
     text = python_of(rendered.code, controls, view)
     path = Path(controls.sensor)
     return text.replace(str(path), path.name) if drops in path.parents else text
 
 
 def take_sensor(files: object, drops: Path) -> Header:
-    """Keep a sensor file that was dropped on the page; return where the page's sliders begin."""
+    """Store a sensor file that was dropped on the page; return the values at which the page's sliders begin."""
     path, sensor = write_dropped(files, drops)
     return {"sensor": str(path), "terms": sensor_terms(sensor)}
 
 
 def _dng(rendered: RenderState, controls: Controls, memo: Memo) -> bytes:
-    """Write an exposure as a digital negative, with colours calibrated as by `rodcone capture`; a burst is refused."""
-    if controls.frames > 1:  # because a negative holds whole numbers, which merged samples aren't
+    """Return an exposure as a digital negative, with colours calibrated as by `rodcone capture`; refuse a burst."""
+    if controls.frames > 1:  # a negative holds whole numbers, but merged samples are means
         raise InputError("dng: a merged burst is no raw file; allowed: 1 frame; save the exposures one by one")
     exposed = expose_scene(rendered.transport, controls, memo)
     light = first_light(exposed.transport.groups, illuminant(controls.reference_light))
@@ -121,7 +121,7 @@ def _dng(rendered: RenderState, controls: Controls, memo: Memo) -> bytes:
 
 
 def python_of(render: str, controls: Controls, view: str = "picture") -> str:
-    """Write the Python that makes a picture of the page again, to the bit.
+    """Write the Python that makes a picture of the page again, bit for bit.
 
     Parameters
     ----------
@@ -149,9 +149,9 @@ def python_of(render: str, controls: Controls, view: str = "picture") -> str:
 
 
 def noise_share(exposed: Exposure, controls: Controls, memo: Memo) -> float:
-    """Return the Monte Carlo variance of the raw electrons over the sensor's own, as `mc_share` of a sweep.
+    """Return the Monte Carlo variance of the raw electrons over the sensor's own, like the `mc_share` of a sweep's row.
 
-    One draw of the error, half the difference of the render's halves, goes through lens and filters as the light does.
+    The error is half the difference of the render's halves, imaged by the lens and the filters as the light is.
     """
     errors_e = []
     for name in exposed.frames:

@@ -1,7 +1,7 @@
-"""From a rendered scene and the controls to a picture, in stages; each is computed again only when its inputs change.
+"""Make a picture from a rendered scene and the controls, in stages; a stage runs again only when its inputs change.
 
-Light adds up: every light group goes through lens and filters by itself, at power 1 and for 1 s, and is kept. Power,
-level and exposure are factors on these, as in a sweep, whose frames are those of 1 cd/m^2 and 1 s.
+Light adds up. So each light group is imaged by lens and filters alone, at power 1 and for 1 s, and the result is kept.
+Power, level and exposure time are factors on it, as in a sweep, whose frames are those at 1 cd/m^2 and 1 s.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -40,13 +40,13 @@ from studies.study.gain import iso_speed
 from studies.study.study import AS_SHOT
 
 Development = Callable[[], tuple[Image, Picture]]  # linear sRGB at the scale of the truth, and the processor's result
-_CHIP, _FRAME, _START = 0, 1, 2  # second part of the seed; the first two are those of `studies.photograph.shot`
+_CHIP, _FRAME, _START = 0, 1, 2  # second part of each stream's seed, the same as in `studies.photograph.shot`
 _LONGEST_S = 1e7
 
 
 @dataclass(frozen=True)
 class GroupFrame:
-    """One light group at power 1, behind the lens and the filters, in 1 s.
+    """Image of one light group at power 1, behind the lens and the filters, in 1 s.
 
     Attributes
     ----------
@@ -70,11 +70,11 @@ class Exposure:
     light : Light
         The light that the camera's colours are set to.
     scale : float
-        Factor from the lamps' own powers to the level.
+        Factor on the lamps' powers by which the scene has the controls' level.
     white_at_own_cd_m2 : float
-        Luminance that is shown as white at the lamps' own powers.
+        Luminance that is shown as white if the lamps have the powers in `transport`.
     frames : mapping of str to GroupFrame
-        Light groups that shine, at power 1.
+        Images of the light groups that shine, each at power 1.
     exposure_s : float
         Exposure time of each frame of the burst.
     expected_e : (h, w) float64
@@ -84,7 +84,7 @@ class Exposure:
     shot_noise : bool
         As in `Controls`.
     iso : float or None
-        Saturation-based speed at the gain of the exposure; None of a camera that has none.
+        Saturation-based speed at the gain of the exposure; None for a camera that has none.
     """
 
     sensor: SensorConfig
@@ -140,7 +140,7 @@ def photograph(transport: Transport, controls: Controls, memo: Memo | None = Non
     transport : Transport
     controls : Controls
     memo : Memo, optional
-        Results of calls before, for the same transport.
+        Results of earlier calls for the same transport.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def photograph(transport: Transport, controls: Controls, memo: Memo | None = Non
 
 
 def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposure:
-    """Light the scene, image it and read the chip out."""
+    """Light the scene, form its image, and read out the chip."""
     require_keys("lamps: light group", controls.lamps, transport.groups)
     lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in transport.groups)
     terms = (
@@ -201,7 +201,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
     exposure_s = controls.exposure_s
     if controls.exposure != TIME:
         rule = AUTO if controls.exposure == AUTO_INFORMATION else controls.exposure
-        # The rule looks at a percentile of the light, which is proportional to the level.
+        # The rule uses a percentile of the light, which is proportional to the level.
         metered = (lit_so, rule, sensor.top_e, sensor.pixel.dark_current_e_per_s, sensor.pixel.crosstalk)
         unit_s = memo.of("rule", metered, exposure_of_electrons_s, rule, per_second_e, sensor, _LONGEST_S)
         time_s = at_level_s(unit_s, scale, rule, sensor)
@@ -234,7 +234,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
 
 
 def development_of(exposed: Exposure, controls: Controls, memo: Memo) -> Development:
-    """State the processor's task for an exposure, which this process or another one (by pickle) can run."""
+    """Return a function that develops an exposure; it can be pickled, and called in this process or another."""
     raw, sensor, light = exposed.raw, exposed.sensor, exposed.light
     fitted = (controls.sensor, controls.mosaic, controls.processor, light.spectrum.tobytes(), sensor.pixel.crosstalk)
     processor = PROCESSORS[controls.processor]
@@ -248,7 +248,7 @@ def development_of(exposed: Exposure, controls: Controls, memo: Memo) -> Develop
 
 
 def true_picture_of(exposed: Exposure, controls: Controls, memo: Memo) -> tuple[Image, NDArray[np.uint8]]:
-    """Return the noise-free picture, linear and as shown; it is the same at every level, as white follows the level."""
+    """Return the noise-free picture, linear and in 8 bits; the same at every level, because white follows the level."""
     lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in exposed.transport.groups)
     return memo.of("truth", (lamps, controls.reference_light), _truth, exposed, controls, memo)
 
@@ -262,7 +262,10 @@ def to_bytes(linear: Image) -> NDArray[np.uint8]:
 
 
 def _in_time(expected_e: Image, controls: Controls, sensor: SensorConfig, exposure_s: float, number: int) -> Image:
-    """Return what an exposure of a burst collects of lamps that may flicker; it starts once the one before is read."""
+    """Return the expected electrons of one exposure of a burst under lamps that may flicker.
+
+    `number` counts the burst's exposures from 0; each starts when the one before has been read out.
+    """
     lamps = lamps_of(controls)
     if not lamps:
         return expected_e

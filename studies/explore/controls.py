@@ -1,4 +1,4 @@
-"""Settings of the explorer's controls as one value: how a message states it, and the lamps and camera that follow."""
+"""Settings of the explorer's controls as one value: read it from a message, and get lamps and a camera from it."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -34,7 +34,7 @@ from studies.study.study import AS_SHOT, MOST_FRAMES, OWN, WHITE_BALANCES
 
 TIME = "time"  # as an exposure rule, this means the time that `exposure_s` states
 LENS = ("f_number", "defocus_um", "diffraction", "veiling_glare")
-OF_TABLE = ("f_number", "defocus_um", "diffraction")  # terms that a lens by data states itself
+OF_TABLE = ("f_number", "defocus_um", "diffraction")  # terms that a lens by data decides, so that sliders can't
 PIXEL = (
     *("read_noise_e", "dsnu_e", "prnu", "dark_current_e_per_s", "column_gain_spread", "column_offset_e"),
     *("hot_pixel_share", "hot_pixel_dark_current_e_per_s", "crosstalk", "full_well_e"),
@@ -43,7 +43,7 @@ SETTINGS = ("neighbourhood", "patch", "sigma_d", "sigma_s")
 # Processors with adjustable settings, and the defaults of these.
 ADJUSTABLE: Mapping[str, Settings] = MappingProxyType({"interleaved": DEFAULTS, "interleaved_paper": PAPER})
 MOST_POINTS = 2000  # most points of a spectrum from a file
-WIDEST = 41  # most pixels along the side of Omega; so many take four times as long as the default
+WIDEST = 41  # most pixels along the side of Omega, the neighbourhood; that many take four times as long as the default
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,9 @@ class Lamp:
     spectrum : str
         ``own``, or an illuminant's name such as ``A`` or ``3000K``, at the luminance of the group's own spectrum.
     power : float
-        Factor on the group's own power; what counts beside a level is its share.
+        Factor on the group's own power. Because the level is fixed, it only changes the group's share of the light.
     table : tuple of (float, float)
-        Wavelength [nm] and value, from a file, in place of `spectrum`; at the same luminance.
+        Wavelengths [nm] and values of a spectrum from a file, in place of `spectrum`; at the same luminance.
     """
 
     spectrum: str = OWN
@@ -76,41 +76,43 @@ class Controls:
     level_cd_m2 : float
         Mean luminance of the scene.
     reference_light : str
-        Illuminant that colours are judged under where the first light group has colours of its own, as a file has.
+        Illuminant under which colours are judged if the first light group has colours of its own, as in a file.
     exposure : str
         A rule of `sensor.exposure.RULES`, or ``time``.
     exposure_s : float
-        Exposure time where `exposure` is ``time``; else the longest time that the rule may choose.
+        Exposure time if `exposure` is ``time``; else the longest time that the rule may choose.
     sensor : str
         A preset's name, or a ``.toml`` file.
     mosaic : str
-        A name of `sensor.cfa.MOSAICS` or `sensor.presets.VARIATIONS`, or ``own``, the sensor's own.
+        A name of `sensor.cfa.MOSAICS` or `sensor.presets.VARIATIONS`, or ``own`` for the sensor's own mosaic.
     lens, pixel : mapping of str to float
         Fields of `LensConfig` (`LENS`) and `PixelConfig` (`PIXEL`) that differ from the preset's.
     lens_table : str
-        A shipped lens by data (`sensor.lens.table.shipped`) in front of the sensor, or ``own``, the sensor's own.
+        A shipped lens by data (`sensor.lens.table.shipped`) in front of the sensor, or ``own`` for the sensor's own.
     bits : int or None
         Bits of the converter; None takes the preset's.
     gain : float or None
-        Between pixel and converter; None takes the preset's, which an automatic exposure may raise.
+        Gain between pixel and converter; None takes the preset's, which an automatic exposure may raise.
     iso : float or None
-        Saturation-based speed that a gain is wanted for, in place of `gain`.
+        Saturation-based speed, from which the gain follows, in place of `gain`.
     shot_noise : bool
-        Whether light and dark current come as Poisson counts; False, which no camera does, takes their means.
+        Whether the electrons of light and dark current are Poisson counts. If False they are their means, which no
+        camera achieves.
     processor : str
         Name in `isp.processors.catalogue.PROCESSORS`.
     settings : mapping of str to float
         Fields of `isp.settings.Settings` (`SETTINGS`) that differ from the processor's.
     white_balance : str
-        Name in `studies.study.study.WHITE_BALANCES`.
+        One of `studies.study.study.WHITE_BALANCES`.
     seed : int
         Seed of the chip's patterns and of the exposures' noise.
     exposure_number : int
-        Number of the exposure among those of that chip; each has noise of its own.
+        Number of the exposure among all those that the seed's chip takes; each has noise of its own.
     frames : int
         Exposures of a burst, merged into one (`sensor.burst.merged_raw`).
     flicker_depth, flicker_hz : float
-        Amplitude and frequency [Hz] of the cosine by which all lamps swing about their mean; depth 0 is steady light.
+        Amplitude, as a share of the mean, and frequency [Hz] of the cosine with which all lamps flicker; a depth of 0
+        is steady light.
     row_time_us : float or None
         Time from one row's exposure to the next one's [us]; None takes the preset's.
 
@@ -177,7 +179,7 @@ class Controls:
 
 
 def mosaics_of(processor: Processor) -> tuple[str, ...]:
-    """List the mosaics that a processor develops: its own, or all of R, G, B and W where it takes any tile."""
+    """List the mosaics that a processor can develop: all that suit it, or only its own one."""
     if processor.mosaic == OWN_MOSAIC:
         any_letters = processor is not PROCESSORS["ple"]
         return (*(name for name, tile in MOSAICS.items() if any_letters or takes(tile)), OWN_MOSAIC)
@@ -210,12 +212,12 @@ def controls_from(content: object, dropped: Iterable[str] = ()) -> Controls:
     content : decoded JSON
         An object with fields of `Controls`; those that are left out have their defaults.
     dropped : iterable of str
-        Files of sensors that were dropped on the page: a message may not make the program read others.
+        Sensor files that were dropped on the page. A message may not make the program read other files.
 
     Raises
     ------
     InputError
-        For anything else.
+        For content that isn't allowed.
     """
     if not isinstance(content, dict):
         raise InputError(f"controls: {content!r} is not allowed; give an object of keys and values")
@@ -237,12 +239,12 @@ def controls_from(content: object, dropped: Iterable[str] = ()) -> Controls:
 
 
 def controls_of(content: Mapping[str, Any], fix: str) -> Controls:
-    """Build checked controls from plain values, lists and dicts by field name; absent ones have their defaults.
+    """Build checked controls from plain values, lists and dicts by field name; absent fields have their defaults.
 
     Raises
     ------
     InputError
-        For an unknown name, a value of another kind, or one that `Controls` refuses.
+        For an unknown name, a value of another type, or one that `Controls` refuses.
     """
     return structured(content, Controls, _CONVERTER, fix)
 
@@ -264,7 +266,10 @@ _CONVERTER.register_structure_hook(float, _number)
 
 
 def lit_transport(transport: Transport, lamps: dict[str, Lamp], reference_light: str) -> tuple[Transport, Light, float]:
-    """Return the transport with its lamps, the light to which colours are balanced, and the factor to 1 cd/m^2."""
+    """Return the transport with the lamps' spectra and powers, the light to which colours are balanced, and a factor.
+
+    The factor scales the lamps' powers so that the scene's mean luminance is 1 cd/m^2.
+    """
     groups = {name: lit_group(group, lamps[name]) for name, group in transport.groups.items()}
     lit = replace(transport, groups=groups)
     level = lit.level().value
@@ -287,7 +292,7 @@ def lit_group(group: LightGroup, lamp: Lamp) -> LightGroup:
     Raises
     ------
     InputError
-        For another spectrum where the group has colours of its own or is dark, or one without light.
+        For another spectrum if the group has colours of its own or is dark, and for a spectrum without light.
     """
     power = group.power * lamp.power
     if lamp.spectrum == OWN and not lamp.table:
@@ -301,7 +306,7 @@ def lit_group(group: LightGroup, lamp: Lamp) -> LightGroup:
 
 
 def lamps_of(controls: Controls) -> tuple[Waveform, ...]:
-    """Return the waveform of all lamps; none where they are steady."""
+    """Return the one waveform of all lamps; return an empty tuple if they are steady."""
     return (Waveform(controls.flicker_hz, controls.flicker_depth),) if controls.flicker_depth else ()
 
 

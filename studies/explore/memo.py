@@ -1,4 +1,4 @@
-"""Keep results between changes of a control, and end work for which nobody waits any more."""
+"""Keep results between two changes of a control, and end work whose result nobody waits for any more."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
@@ -19,7 +19,7 @@ def never_cancel() -> None:
 
 @dataclass(frozen=True)
 class Memo:
-    """The last results of each stage, by the key of what decides them.
+    """The last results of each stage, each under a key of all that decides it.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Memo:
     stages: dict[str, OrderedDict[Hashable, Any]] = field(default_factory=dict)
 
     def of(self, stage: str, key: Hashable, make: Callable[..., T], *arguments: object) -> T:
-        """Return the result kept under a key, or make it of the arguments."""
+        """Return the result kept under a key; if there is none, make it by calling ``make(*arguments)``."""
         kept = self.stages.setdefault(stage, OrderedDict())
         if key not in kept:
             self.check()
@@ -41,7 +41,7 @@ class Memo:
         return result
 
     def keep(self, stage: str, key: Hashable, result: object) -> None:
-        """Keep a result under a key, in place of the oldest one."""
+        """Keep a result under a key; if there are more than `_KEPT`, forget the one that was unused for longest."""
         kept = self.stages.setdefault(stage, OrderedDict())
         kept[key] = result
         if len(kept) > _KEPT:

@@ -1,6 +1,6 @@
 """Messages between program and page: the first one, which describes the program, and the checks of each question.
 
-A sensor's files that were dropped on the page are kept with the tables that it names in a folder of their own.
+Sensor files that are dropped on the page are stored in a folder of their own, with the tables that they name.
 """
 
 import json
@@ -38,8 +38,8 @@ Header: TypeAlias = dict[str, Any]
 
 MOST_CHARACTERS = 200_000  # most characters of a message; three tables of spectra fit into it
 MOST_OF_A_PAGE = 40  # most characters of a page's name
-# Keys that each kind of message has beside `kind`, `number` and, where pages share a connection, `page`. Kinds that
-# stand earlier are answered first.
+# Keys that each kind of message has, besides `kind`, `number` and, if pages share a connection, `page`. Kinds that come
+# earlier in this mapping are answered first.
 KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "hello": (),
@@ -55,7 +55,10 @@ KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 
 
 def first_message(source: Source, scenes: Iterable[str] = (), dropped: Iterable[str] = ()) -> Header:
-    """Describe what the page builds its controls from; it may choose `scenes`, and `dropped` are files of sensors."""
+    """Return all that the page builds its controls from.
+
+    `scenes` are those that the user may choose, `dropped` the sensor files that were dropped on the page.
+    """
     named = dict.fromkeys((*sensors(), *dropped))
     return {
         "title": source.title,
@@ -85,7 +88,7 @@ def first_message(source: Source, scenes: Iterable[str] = (), dropped: Iterable[
 
 
 def lens_terms(name: str) -> Header:
-    """Return a shipped lens's name and f-number as the page shows them, and which sliders of a lens it takes away."""
+    """Return a shipped lens's name and f-number as the page shows them, and the sliders that the page then hides."""
     table = read_lens(name)
     return {"text": f"{name.replace('_', ' ')}, f/{table.f_number:.3g}", "states": list(OF_TABLE)}
 
@@ -104,7 +107,7 @@ def sensor_terms(sensor: SensorConfig) -> Header:
 
 
 def _mosaics() -> Header:
-    """Return the tile of each mosaic by name and a sentence on it; the sensors' own stand with these."""
+    """Return the tile of each mosaic by name, with a sentence on it."""
     return {name: {"tile": list(tile_named(name)), "text": text} for name, text in texts_of("mosaics").items()}
 
 
@@ -114,14 +117,17 @@ def _missing(processor: str) -> bool:
 
 
 def unsent(pictures: Sequence[Bytes], sent: list[Bytes]) -> list[bytes]:
-    """Leave out the pictures that the page has already (`sent`, which is brought up to date)."""
+    """Return pictures as bytes, empty for one that the page has already.
+
+    `sent` holds the pictures that were sent last, and is updated.
+    """
     repeats = [len(sent) > place and np.array_equal(sent[place], picture) for place, picture in enumerate(pictures)]
     sent[:] = pictures
     return [b"" if same else picture.tobytes() for same, picture in zip(repeats, pictures, strict=True)]
 
 
 def read_message(text: str) -> Header:
-    """Check a message's frame: its kind, its keys, its number."""
+    """Parse a message, and check its kind, its keys and its number."""
     if len(text) > MOST_CHARACTERS:
         raise InputError(f"message: {len(text)} characters; allowed: {MOST_CHARACTERS}; send a shorter table")
     try:
@@ -148,7 +154,7 @@ def read_message(text: str) -> Header:
 def is_superseded_by(message: Header, pending: Header) -> bool:
     """Return whether a pending message is answered before this one.
 
-    It is, if it is a newer message of the same kind, or of a kind that comes earlier in `KINDS`.
+    That is so if the pending one is newer and of the same kind, or if its kind comes earlier in `KINDS`.
     """
     if pending["kind"] == message["kind"]:
         return bool(pending["number"] > message["number"])
@@ -161,7 +167,7 @@ def _refuse(constant: str) -> None:
 
 
 def read_views(value: object, cameras: int) -> list[tuple[int, str]]:
-    """Read the camera and name of each view."""
+    """Check the views of a message; return the number of the camera and the name of each."""
     pairs = value if isinstance(value, list) and 1 <= len(value) <= 4 else [value]
     views = []
     for pair in pairs:
@@ -177,12 +183,13 @@ _NAME = re.compile(rf"\w[\w .+-]{{0,99}}\.(toml|{'|'.join(x[1:] for x in ENDINGS
 
 
 def write_dropped(files: object, drops: Path) -> tuple[Path, SensorConfig]:
-    """Write a sensor's ``.toml`` and its tables of curves, by name, below `drops`; give the sensor's path and content.
+    """Write a sensor's ``.toml`` and its tables of curves into a folder below `drops`; return the sensor and its path.
 
     Raises
     ------
     InputError
-        For other files, a table that was not dropped with the sensor, a file that describes no camera, or too many.
+        For other files, too many files, a table that wasn't dropped with its sensor, or a file that describes no
+        camera.
     """
     if not isinstance(files, dict) or not 1 <= len(files) <= MOST_FILES:
         raise InputError(
@@ -211,7 +218,7 @@ def write_dropped(files: object, drops: Path) -> tuple[Path, SensorConfig]:
 
 
 def _check_tables(name: str, files: Mapping[str, str]) -> None:
-    """Refuse a sensor that names files which did not come with it: a message may not make the program read others."""
+    """Refuse a sensor whose tables weren't dropped with it, because a message may not make the program read others."""
     with read_errors(f"sensor: {name!r} is no TOML", "correct it"):
         responses = parse_toml(files[name]).get("responses", {})
     named = [responses.get(key) for key in OF_TABLES] if isinstance(responses, dict) else []

@@ -1,5 +1,6 @@
-"""The explorer's page: on this machine files and one WebSocket, behind a token, for its own origin alone; in a notebook
-the same page over the notebook's own connection.
+"""Serve the explorer's page: on this machine as files and one WebSocket, in a notebook over the notebook's connection.
+
+The server on this machine answers only requests with its token, from its own page.
 """
 
 import asyncio
@@ -36,8 +37,8 @@ HEADERS = {
     "Cache-Control": "no-store",
 }
 EXTRA = "explore"
-# Most messages and characters per second that are read of one connection. A page with one request of each kind under
-# way stays far below. A hostile page doesn't keep the others from their turn.
+# Most messages and characters per second that are read from one connection, so that a hostile page doesn't block the
+# others. A page that waits for the answer to each kind of request, as ours does, stays far below.
 MOST_A_SECOND = 400
 MOST_CHARACTERS_A_SECOND = 20 * MOST_CHARACTERS
 BURST_S = 1.0
@@ -53,7 +54,7 @@ def make_app(session: Session, port: int, token: str) -> App:
     ----------
     session : Session
     port : int
-        Port that the server listens on; part of the host and origin that are let in.
+        Port that the server listens on; the host and origin of a request must name it.
     token : str
         First part of every path.
     """
@@ -109,9 +110,10 @@ def make_app(session: Session, port: int, token: str) -> App:
 
 
 def refusal(scope: Scope, hosts: Sequence[str], token: str) -> str | None:
-    """Return why a request is refused; None where it isn't.
+    """Return why a request is refused; None if it is allowed.
 
-    A WebSocket has to state an origin: a browser always does, and another site's page can open one without asking.
+    A WebSocket has to state its origin, because another site's page can open one without asking; a browser always
+    states it.
     """
     headers = [(name.decode("latin-1").lower(), value.decode("latin-1")) for name, value in scope["headers"]]
     given = {name: [value for other, value in headers if other == name] for name in ("host", "origin")}
@@ -131,7 +133,7 @@ def refusal(scope: Scope, hosts: Sequence[str], token: str) -> str | None:
 
 
 async def _refuse(scope: Scope, receive: Any, send: Any, response: Any) -> None:
-    """Answer before anything is read; a WebSocket is closed before it is opened, which is 403."""
+    """Send a refusal before anything is read; a WebSocket is closed before it opens, which the browser sees as 403."""
     if scope["type"] == "websocket":
         await send({"type": "websocket.close", "code": 1008})
     else:
@@ -139,18 +141,18 @@ async def _refuse(scope: Scope, receive: Any, send: Any, response: Any) -> None:
 
 
 def packed(header: Header, buffers: Sequence[bytes]) -> bytes:
-    """Pack one message: the header's length in 32 bits, the header with the buffers' lengths as JSON, the buffers."""
+    """Pack one message: the header's length in 32 bits, the header as JSON with the buffers' lengths, the buffers."""
     text = json.dumps(header | {"lengths": [len(buffer) for buffer in buffers]}, allow_nan=False).encode()
     return b"".join((struct.pack("<I", len(text)), text, *buffers))
 
 
 def listen(port: int) -> socket.socket:
-    """Open a socket that this machine alone can reach; port 0 takes a free port.
+    """Open a socket that only this machine can reach; port 0 chooses a free port.
 
     Raises
     ------
     InputError
-        For no port, or one that is taken.
+        For a number that is no port, or a port that is in use.
     """
     require_whole("port", port, 0, 65_535, "give a port of this machine, 0 for a free one")
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
@@ -165,7 +167,7 @@ def listen(port: int) -> socket.socket:
 
 
 def require_server() -> None:
-    """Raise `InputError` where a library of the server isn't installed: before a session's thread has begun."""
+    """Raise `InputError` if a library of the server isn't installed; called before a session starts its thread."""
     for name in ("uvicorn", "websockets", "starlette.applications"):
         optional_library(name, EXTRA)
 
@@ -223,7 +225,7 @@ def explore(transport: Transport) -> Any:
     def send(header: Header, buffers: Any) -> None:
         if loop is None:
             widget.send(header, list(buffers))
-        else:  # because a notebook's kernel sends messages from its own thread alone
+        else:  # a notebook's kernel may send messages only from its own thread
             loop.call_soon_threadsafe(widget.send, header, list(buffers))
 
     session.connect(send)

@@ -1,9 +1,9 @@
-"""The explorer's answers to its page: messages come in, pictures and figures go out, on a thread of its own.
+"""A session of the explorer: a thread that receives the page's messages, and answers with pictures and figures.
 
-A page has one request of each kind under way. Of several requests of a kind that wait, only the newest is answered. A
-new request ends an older one of its kind between two stages. Kinds earlier in `KINDS` are answered first: other
-requests wait for them, and a render waits between two runs. When the page is closed, all work ends. Every answer holds
-the number of its request, the controls with which it was made, and the Python that makes it again.
+Of several waiting requests of one kind only the newest is answered. A new request ends the work on an older one of its
+kind, between two stages. Kinds earlier in `KINDS` are answered first: other requests wait for them, and a render waits
+between two runs. When the page is closed, all work ends. Every answer holds the number of its request, the controls
+with which it was made, and the Python that makes it again.
 """
 
 import sys
@@ -68,7 +68,7 @@ class Session:
         self._thread.start()
 
     def connect(self, send: Send) -> None:
-        """Answer another connection from now on, and notify the one before."""
+        """Answer a new connection from now on, and tell the earlier one that it was replaced."""
         with self._changed:
             self._send({"kind": "taken over"}, ())
             self._send = send
@@ -84,9 +84,9 @@ class Session:
                 self._begin_page("")
 
     def take(self, text: str, send: Send) -> None:
-        """Take a message of the connection of `send`; messages of a connection that was replaced are dropped.
+        """Receive a message from the connection to which `send` answers; the session's thread answers it later.
 
-        The session's thread answers it. A message that isn't allowed is refused at once.
+        A message that isn't allowed is refused at once. One from a connection that was replaced is dropped.
         """
         try:
             message = read_message(text)
@@ -123,7 +123,7 @@ class Session:
         self._rendering, self._failure = True, ""  # whether a finer state follows, and if not, why
 
     def _begin_page(self, page: str) -> None:
-        """Forget the requests and pictures of the page before, and note the page that asks now."""
+        """Forget the requests and pictures of the earlier page, and note the page that sends messages now."""
         self._page = page  # the page that asks now
         self._shown: Header | None = None
         self._sent: list[Bytes] = []  # pictures that the page already has
@@ -142,7 +142,7 @@ class Session:
             self._turn(*self._next(self._left_to_do))
 
     def _turn(self, message: Header | None, act: Callable[[], None]) -> None:
-        """Answer a message or do a task; an error becomes one line on the page, which goes on."""
+        """Answer a message or do a task; an error becomes one line on the page, and the session goes on."""
         self._turns = self._turns + 1
         self._message = message
         if self._turns % TRIM_AFTER == 0:
@@ -187,7 +187,7 @@ class Session:
     def _check(self) -> None:
         """Raise `Overtaken` if nobody waits for the work under way any more, or if another message has to go first.
 
-        A message that has to give way to another kind is kept, and answered again after it.
+        A message that has to wait for one of another kind is kept, and answered from the start after that.
         """
         with self._changed:
             message = self._message
@@ -201,7 +201,7 @@ class Session:
                 raise Overtaken
 
     def _left_to_do(self) -> Callable[[], None] | None:
-        """Return the task that waits for the sliders to rest: a finer render or a slow processor."""
+        """Return the task to do while no message waits: a finer render, or a slow processor; None if there is none."""
         if self._rendering:
             return self._render_on
         return self._begin_slow if self._slow_wanted else None
@@ -307,5 +307,5 @@ class Session:
 
 
 def _whose(message: Header) -> Header:
-    """Return the kind, number and page of a message, by which the page recognises an answer to its own request."""
+    """Return the kind, number and page of a message, by which a page recognises the answer to its own request."""
     return {key: message[key] for key in ("kind", "number", "page") if key in message}

@@ -1,4 +1,4 @@
-"""A slow processor at work in a process of its own, which can be ended at any time."""
+"""Run a slow processor in a process of its own, which can be ended at any time."""
 
 import pickle
 import subprocess
@@ -28,8 +28,8 @@ def is_slow(processor: str) -> bool:
 def stand_in(controls: Controls, pixels: int) -> Controls:
     """Return the controls whose picture is shown until a slow processor is done; the given ones if it is quick.
 
-    A slow processor is replaced by ``any_mosaic``, which develops every mosaic, so that two cameras with one slow
-    method are shown by one quick method. Settings that take too long are replaced by the processor's own.
+    A slow processor is replaced by ``any_mosaic``. It develops every mosaic, so that two cameras with the same slow
+    method are shown by the same quick one. Settings that take too long are replaced by the processor's defaults.
     """
     if is_slow(controls.processor):
         return replace(controls, processor="any_mosaic", settings={})
@@ -76,7 +76,7 @@ def begin(
 
 
 def work() -> None:
-    """Develop the task on standard input, and write the result to standard output."""
+    """Read a pickled `Development` from standard input, call it, and pickle the result to standard output."""
     development: Development = pickle.load(sys.stdin.buffer)
     try:
         result: tuple[Image, Picture] | InputError = development()

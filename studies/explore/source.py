@@ -1,4 +1,4 @@
-"""Open what is explored, a scene or a file of radiance, and write the Python that makes its transport."""
+"""Open the scene or file of radiance that is explored, and write the Python that makes its transport."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -53,8 +53,8 @@ class Source:
     ----------
     title : str
     states : callable
-        Function that yields `RenderState` objects, coarse to fine. It calls its argument between two runs of the
-        render, which ends the render by raising an error.
+        Function that yields `RenderState` objects, coarse to fine. Its argument is a function that it calls between two
+        runs of the render, and which may end the render by raising an error.
     groups : mapping of str to bool
         Light groups, and whether one has colours of its own.
     notes : tuple of str
@@ -115,7 +115,7 @@ def open_source(source: str, options: RenderOptions) -> Source:
     Raises
     ------
     InputError
-        For what isn't there, can't be read, or needs more memory than is free.
+        For a source that doesn't exist, can't be read, or needs more memory than is free.
     """
     if is_radiance_file(source):
         check_radiance_file(source, ())
@@ -163,7 +163,7 @@ def open_source(source: str, options: RenderOptions) -> Source:
 def _ready(
     source: str, scene: Scene, size: tuple[int, int], bands: tuple[Floats, Floats], options: RenderOptions
 ) -> Ready | None:
-    """Take the shipped light of a scene of the catalogue, where no option asks for a render."""
+    """Return a catalogue scene's light that was rendered before; None without any, or if an option wants a render."""
     if options.render or options.spp is not None or options.seed or source not in scene_names():
         return None
     return find_ready(scene, size, size, [group.spectrum for group in scene.groups.values()], bands)
@@ -176,18 +176,17 @@ def load_transport(path: str | Path, light: str = LIGHT, *, size: tuple[int, int
     ----------
     path : str or Path
         A picture file (`rodcone.load_radiance`), reference light (.npz of `rodcone reference`), or the name of a scene
-        whose light comes with rodcone, such as still_life: it was rendered with so many samples that no noise of it
-        shows.
+        whose light comes with rodcone, such as still_life; that light has so many samples that its noise doesn't show.
     light : str
-        Illuminant of reflectances, which other lamps may replace; radiance has its light in it.
+        Illuminant of a file of reflectances, which other lamps may replace. A file of radiance has its light in it.
     size : (int, int) or int, optional
-        Size of a scene's light: height and width in pixels, or the longer side, to which it is averaged; left out, the
-        light's own size.
+        Size to which a scene's light is averaged: height and width in pixels, or the longer side; left out, the light's
+        own size.
 
     Raises
     ------
     InputError
-        As `rodcone.load_radiance`, and for a scene or size whose light isn't there.
+        As `rodcone.load_radiance`, and for a scene or size without light.
     """
     if isinstance(path, str) and not Path(path).suffix:
         return load_ready(path, size)
@@ -196,7 +195,7 @@ def load_transport(path: str | Path, light: str = LIGHT, *, size: tuple[int, int
 
 
 def _with_its_light(transport: Transport, path: str | Path) -> Transport:
-    """Return a file's transport, with the light group of a radiance marked as one that has colours of its own."""
+    """Return a file's transport; if the file holds radiance, mark its light group as having colours of its own."""
     if is_reflectance(path) or is_reference(path):
         return transport
     groups = {name: replace(group, coloured=True) for name, group in transport.groups.items()}
@@ -211,7 +210,7 @@ def _states(
     code: str,
     between_runs: Callable[[], None],
 ) -> Iterator[RenderState]:
-    """Render a few pixels, then all of them, then with all samples."""
+    """Yield a render of few pixels, then one of all pixels, then one with all samples."""
     full_spp = options.spp or _SPP
     steps = [(size, full_spp)]
     if full_spp > FIRST_SPP:

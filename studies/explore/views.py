@@ -1,4 +1,4 @@
-"""Views of a shot: pictures of 8 bits, and figures as plain numbers."""
+"""Views of a shot: 8-bit pictures, and figures as numbers for JSON."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -52,7 +52,8 @@ def raw_picture(shot: Shot) -> Bytes:
 def noise_picture(shot: Shot) -> Bytes:
     """Show the raw image less the expected electrons: grey is 0, black and white are four standard deviations."""
     exposed = shot.exposed
-    light = exposed.raw.exposure_s / exposed.exposure_s  # a burst's number of frames, or several readings' share
+    # For a burst, the number of its frames; for several readings, the share of the exposure time that they have.
+    light = exposed.raw.exposure_s / exposed.exposure_s
     noise_e = exposed.raw.electrons / light - _collected_e(exposed)
     return _grey(0.5 + 0.5 * noise_e * round(light) ** 0.5 / (MOST_SIGMAS * noise_scale_e(exposed)))
 
@@ -168,7 +169,7 @@ def _bytes(encoded: Image) -> Bytes:
 
 
 def facts(shot: Shot) -> dict[str, Any]:
-    """Return the figures of a shot: exposure time, gain, speed, share of full pixels, green's SNR if measured."""
+    """Return figures of a shot: exposure time, gain, speed, share of full pixels, green's SNR if it was measured."""
     exposed = shot.exposed
     saturated = float(exposed.raw.saturated.mean())
     return {
@@ -187,7 +188,7 @@ def histogram(raw: RawImage) -> dict[str, Any]:
     -------
     dict
         ``edges_e`` (n + 1,), the bins' edges; ``counts`` by channel, (n,), where the first and the last bin also count
-        what lies beyond them; ``well_e``, the full well; and ``floor_e``, the dark noise of a pixel.
+        samples beyond them; ``well_e``, the full well; and ``floor_e``, the dark noise of a pixel.
     """
     deepest_e = max(raw.full_well_e, *(raw.noise_of(channel).full_well_e for channel in raw.channels))
     edges = np.geomspace(LEAST_E, 1.05 * deepest_e, BINS + 1)
@@ -205,11 +206,11 @@ def pixel(exposed: Exposure, row: int, column: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``photons`` on the pixel's area; ``electrons`` by channel, as if the pixel had its filter; ``channel``, its own;
-        ``read_e``, what the raw image (of a burst all of it) reads there, and ``well_e``, the most that it can;
-        ``noise_e``, the standard deviation of each source [e-], and their ``total``, as if nothing clipped.
-        ``wavelength_nm``, ``photons_nm`` (by band, a nanometre) and
-        ``electrons_nm`` (by channel and band, a nanometre) are its spectrum, and what the filters make of it.
+        ``photons`` on the pixel's area; ``electrons`` by channel, as if the pixel had that channel's filter;
+        ``channel``, its own; ``read_e``, the electrons that the raw image reads there, summed over a burst, and
+        ``well_e``, the most that it can read; ``noise_e``, the standard deviation of each noise source [e-], and their
+        ``total``, as if nothing clipped. ``wavelength_nm``, ``photons_nm`` (by band, per nanometre) and
+        ``electrons_nm`` (by channel and band, per nanometre) are the spectrum of the light, and of the electrons.
 
     Raises
     ------
@@ -221,7 +222,7 @@ def pixel(exposed: Exposure, row: int, column: int) -> dict[str, Any]:
     require_whole("column", column, 0, raw.shape[1] - 1, "give a column of the frame")
     nm, width = exposed.transport.wavelength_nm, exposed.transport.width_nm
 
-    # Light of all groups on the pixel
+    # The light of all groups on the pixel.
     def light(name: str, frame: GroupFrame) -> Image:
         factor = exposed.transport.groups[name].power * exposed.scale
         return factor * np.asarray(frame.irradiance.values[row, column], dtype=np.float64)

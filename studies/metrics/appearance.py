@@ -1,5 +1,5 @@
-"""How far a picture is from the truth: PSNR, SSIM, CIEDE2000 on sRGB in [0, 1]; and to the eye: S-CIELAB, FLIP, and
-PSNR of absolute luminance on PU21's scale of equally visible steps.
+"""Measure how far a picture is from the truth: PSNR, SSIM and CIEDE2000 of sRGB in [0, 1]; and how far it looks to the
+eye: S-CIELAB, FLIP, and PSNR of absolute luminance on PU21's scale of equally visible steps.
 
 Source of PU21: Mantiuk & Azimi, "PU21: A novel perceptually uniform encoding for adapting existing quality metrics for
 HDR", Picture Coding Symposium 2021; constants as the authors publish them with the paper (gfxdisp/pu21).
@@ -30,7 +30,7 @@ class Quality:
 
 
 def require_finite(**arrays: ArrayLike) -> None:
-    """Raise `InputError` for the first NaN or infinity in an array, which no figure of quality would show."""
+    """Raise `InputError` for the first NaN or infinity in an array; a figure of quality wouldn't say where it is."""
     for name, values in arrays.items():
         if not np.isfinite(values).all():
             where = tuple(int(i) for i in np.argwhere(~np.isfinite(values))[0])
@@ -55,8 +55,8 @@ def psnr_db(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
 def picture_quality(picture: NDArray[np.float64], truth: "NDArray[np.float64] | TruePicture") -> Quality:
     """Compare encoded sRGB pictures (h, w, 3) in [0, 1].
 
-    SSIM is Wang et al. 2004 with its Gaussian window; CIEDE2000 takes D65 as the white. A `TruePicture` as the truth
-    saves half of the work where many pictures are compared with one.
+    SSIM is that of Wang et al. 2004 with its Gaussian window; the white of CIEDE2000 is D65. If many pictures are
+    compared with the same truth, a `TruePicture` saves half of the work.
 
     Raises
     ------
@@ -72,14 +72,14 @@ def picture_quality(picture: NDArray[np.float64], truth: "NDArray[np.float64] | 
 
 @dataclass(frozen=True)
 class TruePicture:
-    """The noise-free picture, and what comparisons need of it, computed once for all pictures compared with it.
+    """The noise-free picture, and quantities derived from it for comparisons, computed once for all pictures.
 
     Attributes
     ----------
     linear : (h, w, 3) float64
         sRGB, not clipped; white is 1.
     encoded, lab : (h, w, 3) float64
-        As a display shows it, and its CIELAB.
+        The picture as a display shows it, and its CIELAB.
     eye_lab : (h, w, 3) float64
         CIELAB after the eye's blur.
     seen : Seen
@@ -98,7 +98,7 @@ class TruePicture:
 
 @dataclass(frozen=True)
 class Appearance:
-    """Differences that an eye sees.
+    """Differences between a picture and the truth as an eye sees them.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class Appearance:
 
 
 def true_picture(linear: Image) -> TruePicture:
-    """Compute what comparisons need of linear sRGB (h, w, 3); `InputError` for a value that is NaN or infinite."""
+    """Compute a `TruePicture` from linear sRGB (h, w, 3); raise `InputError` for a value that is NaN or infinite."""
     require_finite(truth=linear)
     encoded = encode_srgb(linear)
     shown = np.clip(linear, 0.0, 1.0)
@@ -132,12 +132,12 @@ def true_picture(linear: Image) -> TruePicture:
 
 
 def appearance(linear: Image, truth: TruePicture, white_cd_m2: float) -> Appearance:
-    """Compare a picture with the truth, both of one scale: nothing is fitted to the picture.
+    """Compare a picture with the truth, both in the same scale; nothing is fitted to the picture.
 
     Parameters
     ----------
     linear : (h, w, 3) float64
-        sRGB, not clipped; 1 stands for `white_cd_m2`.
+        sRGB, not clipped, in which `white_cd_m2` is 1.
     truth : TruePicture
     white_cd_m2 : float
         Luminance of white. FLIP and S-CIELAB compare the pictures as a display shows them, whatever this is; PU21
@@ -160,7 +160,7 @@ def appearance(linear: Image, truth: TruePicture, white_cd_m2: float) -> Appeara
     )
 
 
-LEAST_CD_M2, MOST_CD_M2 = 0.005, 10_000.0  # range of the encoding; luminance outside counts as its nearer end
+LEAST_CD_M2, MOST_CD_M2 = 0.005, 10_000.0  # range of PU21; luminance outside counts as the nearer end
 PEAK = 256.0  # the authors' peak for PSNR: about the value of a 100 cd/m^2 display's white, as 255 is in 8 bits
 # The authors' preferred fit, "banding_glare": visibility of steps in smooth gradients, with the glare of the eye.
 _P = (0.353487901, 0.3734658629, 8.277049286e-05, 0.9062562627, 0.09150303166, 0.9099517204, 596.3148142)
@@ -188,7 +188,7 @@ def pu21_psnr_db(picture_cd_m2: ArrayLike, truth_cd_m2: ArrayLike) -> float:
     Parameters
     ----------
     picture_cd_m2, truth_cd_m2 : (h, w) array_like
-        Absolute luminance, not clipped at white: the same error counts for less in daylight than at dusk.
+        Absolute luminance, not clipped at white. The same error weighs less in daylight than at dusk.
 
     Raises
     ------

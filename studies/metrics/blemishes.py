@@ -1,7 +1,7 @@
-"""What an eye sees first in a developed picture and a mean over all pixels hides: spots, holes in lights, dots.
+"""Count blemishes that an eye sees first in a developed picture, and that a mean over all pixels hides.
 
-A spot is a pixel of a hue that nothing around it has. A hole is a dark pixel in a light. A dot is a pixel of an even
-surface that stands out of it.
+A spot is a pixel of a hue that nothing around it has. A hole is a dark pixel in a light. A dot is a pixel that stands
+out of an even surface.
 """
 
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ from skimage.color import deltaE_ciede2000, rgb2lab
 from rodcone.colour_spaces import decode_srgb, luminance_of_srgb
 from studies.metrics.appearance import require_finite
 
-SPOT = 20.0  # CIEDE2000 to every neighbour's truth: a colour with another name
-LIGHT, HOLE = 0.5, 0.2  # a light has half of white's brightness or more, its hole a fifth of white's or less
-EVEN, DOT = 1.0, 5.0  # CIEDE2000: by less the truth of an even surface varies, by more a dot differs
+SPOT = 20.0  # CIEDE2000 of a spot to the truth of every neighbour, so large that its colour has another name
+LIGHT, HOLE = 0.5, 0.2  # a light has half of white's brightness or more, a hole in it a fifth of white's or less
+EVEN, DOT = 1.0, 5.0  # CIEDE2000 up to which the truth of an even surface varies, and from which on a dot differs
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,11 @@ class Blemishes:
     Attributes
     ----------
     spots : int
-        Pixels of a hue that no truth within a pixel has.
+        Pixels of a hue that the truth has neither there nor in a neighbouring pixel.
     holes : int
-        Dark where the truth is a light.
+        Dark pixels where the truth is a light.
     dots : int
-        Standing out of an even surface.
+        Pixels that stand out of an even surface.
     even : int
         Pixels on even surfaces.
     """
@@ -45,10 +45,10 @@ class Blemishes:
 def count_blemishes(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> Blemishes:
     """Count the blemishes of an encoded sRGB picture (h, w, 3) in [0, 1] beside the truth.
 
-    A spot is compared with the truth at the truth's lightness, so that noise of lightness alone makes none. It must
-    also differ from the median of the picture's 5 x 5 pixels, so that a wrong cast over an area makes none. A pixel is
-    even if the truth in its 5 x 5 pixels is within one CIEDE2000 of its own; a dot differs by five from the picture's
-    median there.
+    A pixel is compared with the truth at the truth's lightness, so that noise of lightness alone makes no spot. A spot
+    must also differ from the median of the picture's 5 x 5 pixels around it, so that a wrong cast over an area makes no
+    spots. A pixel is on an even surface if the truth in the 5 x 5 pixels around it is within one CIEDE2000 of its own;
+    a dot differs by five from the picture's median there.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def count_blemishes(picture: NDArray[np.float64], truth: NDArray[np.float64]) ->
 
 
 def _around(values: NDArray[np.float64], reach: int) -> list[NDArray[np.float64]]:
-    """Return each pixel's neighbours up to `reach` pixels away and the pixel itself, mirrored at the border."""
+    """Return a picture for each shift by up to `reach` pixels, no shift included; it is mirrored at the border."""
     padded = np.pad(values, ((reach, reach), (reach, reach), (0, 0)), mode="reflect")
     windows = sliding_window_view(padded, (2 * reach + 1,) * 2, axis=(0, 1))
     return [windows[..., i, j] for i, j in np.ndindex(windows.shape[3:])]

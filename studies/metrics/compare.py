@@ -1,4 +1,4 @@
-"""A developed picture measured against the scene without noise, for one's own script: the metrics of a study."""
+"""Measure a developed picture against the noise-free scene by the metrics of a study, in a script of one's own."""
 
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -44,12 +44,12 @@ class ReferencePicture:
 
     @cached_property
     def truth(self) -> TruePicture:
-        """Return what comparisons need of the picture, computed once."""
+        """Return the `TruePicture` for comparisons, computed once."""
         return true_picture(self.linear)
 
     @method
     def encode(self, encoding: str = "srgb") -> Image:
-        """Encode the picture for a display, of `isp.colour.encoding.ENCODINGS`: shape (h, w, 3), 0 to 1."""
+        """Encode the picture for a display, by a name in `isp.colour.encoding.ENCODINGS`; (h, w, 3) in [0, 1]."""
         return encode(self.linear, encoding)
 
     def _repr_png_(self) -> bytes:
@@ -65,12 +65,12 @@ def reference_picture(radiance: SpectralRadiance, light: Spectrum | None = None)
         The radiance that `capture` was given.
     light : Spectrum, optional
         Lamp whose colour is shown as white, or an illuminant's name; left out, the one that the radiance states, else
-        D65, which `capture` takes too.
+        D65, as in `capture`.
 
     Returns
     -------
     ReferencePicture
-        White is the luminance of which the 99th percentile of pixels has 90 %.
+        The 99th percentile of the pixels' luminance is 90 % of its white.
     """
     lamp = light or radiance.light or illuminant("D65")
     white_cd_m2 = white_of_pixels(radiance.luminance(), np.zeros(radiance.shape))
@@ -83,9 +83,9 @@ def reference_picture(radiance: SpectralRadiance, light: Spectrum | None = None)
 def measure(picture: Picture | ArrayLike, reference: ReferencePicture) -> dict[str, float]:
     """Measure a developed picture against the scene without noise, by the metrics of a study.
 
-    The picture is brought to the reference's brightness by one factor, so that its brightness isn't judged: the mean
-    luminance is the same where light above white counts as white, since a lamp that a camera clips says nothing of the
-    exposure. A study takes the factor from the camera instead.
+    The picture is first multiplied by one factor, so that its brightness isn't judged: the mean luminances then agree,
+    with luminance above white counted as white, because a clipped lamp says nothing about the exposure. A study uses
+    the factor that is known for the camera instead.
 
     Parameters
     ----------
@@ -97,11 +97,12 @@ def measure(picture: Picture | ArrayLike, reference: ReferencePicture) -> dict[s
     Returns
     -------
     dict of str to float
-        ``psnr_db``: peak signal over the mean square difference of encoded sRGB [dB]; 3 dB are half the light.
-        ``ssim``: structural similarity, 1 for the same picture. ``delta_e_median``, ``delta_e_p95``: CIEDE2000 over
-        pixels; 1 is about what is just seen on even patches. ``s_cielab_median``, ``s_cielab_p95``: CIELAB difference
-        after the eye's blur. ``flip_mean``: LDR-FLIP, 0 to 1, of alternating pictures. ``pu21_psnr_db``: PSNR on a
-        scale of equally visible steps of absolute luminance.
+        ``psnr_db``: peak signal over the mean square difference of encoded sRGB [dB]; half the light costs about 3 dB.
+        ``ssim``: structural similarity, 1 for the same picture. ``delta_e_median``, ``delta_e_p95``: median and 95th
+        percentile of CIEDE2000 over pixels; a difference of 1 can just be seen on even patches. ``s_cielab_median``,
+        ``s_cielab_p95``: the same of the CIELAB difference after the eye's blur. ``flip_mean``: mean LDR-FLIP, the
+        difference seen when the pictures alternate, 0 to 1. ``pu21_psnr_db``: PSNR on a scale of equally visible steps
+        of absolute luminance.
 
     Raises
     ------
@@ -127,7 +128,7 @@ def measure(picture: Picture | ArrayLike, reference: ReferencePicture) -> dict[s
 def _brightness(luminance: Image, reference: Image) -> float:
     """Return the factor k for which the mean of min(k luminance, 1) is the mean of min(reference, 1).
 
-    Both are means over cells of 8 x 8 pixels, so that noise above white isn't taken for light above white.
+    Luminances are first averaged over cells of 8 x 8 pixels, so that noise above white isn't clipped like light.
     """
     counts = _cell_sums(np.ones_like(reference))
     picture, scene = _cell_sums(luminance) / counts, _cell_sums(reference) / counts
@@ -136,14 +137,14 @@ def _brightness(luminance: Image, reference: Image) -> float:
         return float(np.average(np.minimum(factor * cells, 1.0), weights=counts))
 
     wanted = shown(scene, 1.0)
-    low = wanted / float(luminance.mean())  # clipping takes light away, so that the factor is this or more
+    low = wanted / float(luminance.mean())  # clipping removes light, so the factor is at least this
     high = next((k for k in low * 2.0 ** np.arange(1, _MOST_DOUBLED) if shown(picture, k) >= wanted), None)
-    if high is None or shown(picture, low) >= wanted:  # nothing clips, but for rounding
+    if high is None or shown(picture, low) >= wanted:  # nothing clips, except by rounding
         return low
     return float(scipy.optimize.brentq(lambda k: shown(picture, k) - wanted, low, high))
 
 
 def _cell_sums(plane: Image) -> Image:
-    """Return sums over cells of `_CELL_PX` pixels along each side, those at the end smaller."""
+    """Return sums over cells with `_CELL_PX` pixels along each side; cells at the far borders are smaller."""
     rows, columns = (np.arange(0, side, _CELL_PX) for side in plane.shape)
     return np.asarray(np.add.reduceat(np.add.reduceat(plane, rows, axis=0), columns, axis=1))

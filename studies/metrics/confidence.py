@@ -1,4 +1,4 @@
-"""The interval that holds the mean over seeds with a stated confidence."""
+"""The confidence interval of a mean over seeds."""
 
 import numpy as np
 import scipy
@@ -17,7 +17,7 @@ def half_width(samples: Floats, confidence: float = 0.95) -> Floats:
     samples : (..., seed) float64
         One figure per seed, independent of each other.
     confidence : float
-        Share of such intervals that hold the true mean; most papers state 0.95.
+        Share of such intervals that contain the true mean; most papers state 0.95.
     """
     count = samples.shape[-1]
     if count == 1:

@@ -1,9 +1,10 @@
 """LDR-FLIP: the difference that an eye sees where two pictures alternate, from 0 to 1 per pixel.
 
 Source: Andersson, Nilsson, Akenine-Moller, Oskarsson, Astrom & Fairchild, "FLIP: A difference evaluator for alternating
-images", Proc. ACM Comput. Graph. Interact. Tech. 3(2), 2020; numbers of sections and equations are its own. Every
-filter of it is a product of a filter along rows and one along columns, or a sum of two of these, so that each is taken
-along one axis after the other. What one picture needs by itself is computed once, since a study compares many with one.
+images", Proc. ACM Comput. Graph. Interact. Tech. 3(2), 2020; numbers of sections and equations are the paper's. Each of
+its filters is a product of a filter along rows and one along columns, or a sum of two such products, so it is applied
+along one axis after the other. What depends on one picture alone is computed once, because a study compares many
+pictures with one.
 """
 
 from dataclasses import dataclass
@@ -20,11 +21,11 @@ from studies.metrics.s_cielab import PIXELS_PER_DEGREE
 # Section 4.1.1, Table 1: weights a and widths b [degree^2] of the Gaussians a sqrt(pi / b) exp(-pi^2 r^2 / b) which
 # blur each plane of YCxCz as the eye's contrast sensitivity does.
 CONTRAST = (((1.0, 0.0047),), ((1.0, 0.0053),), ((34.1, 0.04), (13.5, 0.025)))
-WIDEST = 0.04  # the largest b: all filters reach to three standard deviations of its Gaussian
+WIDEST = 0.04  # the largest b; all filters reach to three standard deviations of the Gaussian with this b
 Q_COLOUR, P_COLOUR, P_KNEE = 0.7, 0.4, 0.95  # section 4.1.3: q_c, p_c, p_t
 FEATURE_DEG = 0.082  # section 4.2.1: width w of the features' filters; their standard deviation is w / 2
 Q_FEATURE = 0.5  # equation 13: q_f
-# Matrix from linear sRGB under D65, as in the authors' program; its rows sum to the white.
+# Matrix from linear sRGB to XYZ under D65, as in the authors' program; the sums of its rows are the white.
 TO_XYZ = np.array(
     [
         [10135552 / 24577794, 8788810 / 24577794, 4435075 / 24577794],
@@ -33,7 +34,7 @@ TO_XYZ = np.array(
     ]
 )
 WHITE = TO_XYZ.sum(axis=1)
-_SLOPE = 6 / 29  # below its cube CIELAB's cube root is replaced by a line
+_SLOPE = 6 / 29  # below the cube of this value CIELAB's cube root is replaced by a line
 
 
 @dataclass(frozen=True)
@@ -56,12 +57,12 @@ class Seen:
 
 
 def seen(encoded: NDArray[np.floating], pixels_per_degree: float = PIXELS_PER_DEGREE) -> Seen:
-    """Return what FLIP needs of one picture, encoded sRGB (h, w, 3) in [0, 1]."""
+    """Return the quantities of one picture that FLIP compares, from encoded sRGB (h, w, 3) in [0, 1]."""
     return seen_light(decode_srgb(np.asarray(encoded, dtype=np.float64)), pixels_per_degree)
 
 
 def seen_light(linear: Image, pixels_per_degree: float = PIXELS_PER_DEGREE) -> Seen:
-    """Return what FLIP needs of a display's light, linear sRGB (h, w, 3) in [0, 1]."""
+    """Return the quantities of one picture that FLIP compares, from linear sRGB of a display (h, w, 3) in [0, 1]."""
     planes = np.ascontiguousarray(np.moveaxis(linear, -1, 0))
     x, luminance, z = np.einsum("ij,j...->i...", TO_XYZ / WHITE[:, None], planes)
     # Planes of YCxCz: 116 Y - 16, 500 (X - Y), 200 (Y - Z). Blur keeps sums and constants, so it acts on X, Y, Z here.
@@ -84,9 +85,10 @@ def flip(
     Parameters
     ----------
     picture, truth : (h, w, 3) array or Seen
-        Encoded sRGB in [0, 1]; or what `seen` made of it. An array is then seen at the other's pixels per degree.
+        Encoded sRGB in [0, 1], or the result of `seen`. A `picture` that is an array is compared at the pixels per
+        degree of a `truth` from `seen`.
     pixels_per_degree : float
-        Pixels per degree of the eye's view; the default is FLIP's own.
+        Pixels per degree of the eye's view; the default is FLIP's own. It counts for arrays.
     """
     second = truth if isinstance(truth, Seen) else seen(truth, pixels_per_degree)
     first = picture if isinstance(picture, Seen) else seen(picture, second.pixels_per_degree)
@@ -97,7 +99,7 @@ def flip(
 
 
 def _blurred(plane: Image, gaussians: tuple[tuple[float, float], ...], pixels_per_degree: float) -> Image:
-    """Blur a plane by a sum of Gaussians with the sum 1; pixels at the border are repeated beyond it."""
+    """Blur a plane by a sum of Gaussians whose weights sum to 1; pixels at the border are repeated beyond it."""
     reach = ceil(3 * np.sqrt(WIDEST / (2 * pi**2)) * pixels_per_degree)
     degrees = np.arange(-reach, reach + 1) / pixels_per_degree
     lines = [np.exp(-(pi**2) * degrees**2 / b) for _, b in gaussians]
@@ -110,9 +112,9 @@ def _blurred(plane: Image, gaussians: tuple[tuple[float, float], ...], pixels_pe
 
 
 def _features(luminance: Image, pixels_per_degree: float) -> tuple[Image, Image]:
-    """Return the strength of edges and of points: the length of the gradient of first and second derivatives (4.2.1).
+    """Return the strengths of edges and points: the lengths of the vectors of first and second derivatives (4.2.1).
 
-    Each derivative's positive taps sum to 1, and its negative ones to -1.
+    The positive taps of each derivative's filter sum to 1, and the negative ones to -1.
     """
     sigma = 0.5 * FEATURE_DEG * pixels_per_degree
     at = np.arange(-ceil(3 * sigma), ceil(3 * sigma) + 1)

@@ -1,4 +1,4 @@
-"""Metrics by which pictures are compared: what each says, and which difference a person sees."""
+"""Metrics by which pictures are compared: what each one means, and how large a difference a person sees."""
 
 import tomllib
 from dataclasses import dataclass
@@ -12,15 +12,16 @@ class Metric:
     Attributes
     ----------
     key : str
-        Name in a cell and in a row.
+        Name of the metric's column in `studies.sweep.row.Row`.
     name : str
+        Name for a reader.
     digits : int
-        Decimals.
+        Number of decimals that are shown.
     unit : str
     higher : bool
         Whether higher is better.
     threshold : float
-        Smallest difference of two pictures that is called visible, in the metric's unit; see `SEEN_BY`.
+        Smallest difference between two pictures that is called visible, in the metric's unit; see `SEEN_BY`.
     """
 
     key: str
@@ -43,14 +44,14 @@ MTF50 = Metric("mtf50_cy_per_px", "MTF50", 3, "cy/px", higher=True, threshold=0.
 CHART = Metric("chart_delta_e_mean", "ΔE2000 of the chart", 1, "", higher=False, threshold=1.0)
 PATCHES = Metric("patch_snr_db", "SNR of the patches", 1, "dB", higher=True, threshold=0.5)
 _TEXTS = tomllib.loads(Path(__file__).with_name("meanings.toml").read_text("utf-8"))
-# Sources of the differences in `Metric.threshold`; and by key what each metric says, and where it misleads.
+# Sources for the values of `Metric.threshold`; and, by each metric's key, what it means and where it misleads.
 SEEN_BY: str = _TEXTS["seen_by"]
 MEANINGS: dict[str, str] = _TEXTS["meanings"]
-ON_TARGETS = (MTF50, CHART, PATCHES)  # metrics that are known only on the scene that they are made for
+ON_TARGETS = (MTF50, CHART, PATCHES)  # metrics that exist only for the scene of their test target
 METRICS = (PSNR, SSIM, DELTA_E, DELTA_E_95, S_CIELAB, S_CIELAB_95, FLIP, PU21, *ON_TARGETS)
-# Metrics that a report draws at first, and on which its verdict in words is based: a reader can look up in the charts
+# Metrics that a report draws at first, and on which its verdict in words is based, so that a reader finds in the charts
 # what the words claim.
 HEADLINE = (PSNR, DELTA_E, FLIP)
-# One metric of each family, known on every scene: the columns of `rodcone judge`, and the metrics by which two levels
-# count as one where a person sees no difference in any. PU21 isn't among them, because it weighs errors by the light.
+# One metric of each family that exists for every scene. They are the columns of `rodcone judge`. Two levels count as
+# one if a person sees no difference in any of them. PU21 isn't among them, because it weighs errors by the light.
 DECIDING = (PSNR, SSIM, DELTA_E, FLIP)

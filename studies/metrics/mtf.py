@@ -1,10 +1,11 @@
 """Sharpness from a slanted edge: the spatial frequency response of ISO 12233 (e-SFR), and where it falls to half.
 
-Source: ISO 12233:2017, clause 6 and annex D: edge found row by row, a line through it, all pixels sorted by distance
-into quarter-pixel bins (4x oversampled edge), its derivative under a Hamming window, Fourier transform. Four places
-are worked out from first principles. Distances are across the edge, not along the row. A bin's mean stands at its
-samples' mean distance, which is not quite its middle. The derivative's own response is divided out; the standard prints
-it with a slip. So is the bin's own, which the standard leaves in: 1 % at 0.3 cycles per pixel.
+Source: ISO 12233:2017, clause 6 and annex D. The edge is found row by row, and a line is fitted to it. All pixels are
+sorted by their distance from the line into quarter-pixel bins, which gives a 4x oversampled edge. Its derivative under
+a Hamming window is Fourier-transformed. Four details differ from the standard's text. Distances are measured across the
+edge, not along the row. A bin's mean is placed at its samples' mean distance, which is not quite the bin's middle. The
+derivative's own response is divided out by the right formula, which the standard misprints. The bin's own response is
+divided out too, which the standard omits: 1 % at 0.3 cycles per pixel.
 """
 
 from dataclasses import dataclass
@@ -18,9 +19,11 @@ from rodcone.types import Floats
 from sensor.diffraction import half_frequency
 
 OVERSAMPLING = 4  # bins per pixel, as in the standard
-LEAST_REACH_PX = 8.0  # the window takes 0.46 pi^2 / (2 reach^2) off the variance of a 1-pixel blur: 3.5 % at this reach
+# Least pixels on either side of the edge. The window lowers the variance of a 1-pixel blur by 0.46 pi^2 / (2 reach^2):
+# 3.5 % at this reach.
+LEAST_REACH_PX = 8.0
 HIGHEST_CYCLES_PER_PX = 1.0  # twice Nyquist; above it the derivative's response is too small to divide by
-_PASSES = 4  # passes, each with the rows' windows centred on the line of the one before; the standard makes two
+_PASSES = 4  # fits of the line, each with the rows' windows centred on the line before; the standard makes two
 
 
 @dataclass(frozen=True)
@@ -30,7 +33,7 @@ class EdgeResponse:
     Attributes
     ----------
     angle_deg : float
-        Angle from the vertical, anticlockwise; for an edge nearer the horizontal, of the transposed picture.
+        Angle from the vertical, anticlockwise. An edge nearer the horizontal is measured in the transposed picture.
     frequency_cycles_per_px : (n,) float64
         Frequencies from 0 to 1; Nyquist is 0.5.
     mtf : (n,) float64
@@ -48,8 +51,9 @@ class EdgeResponse:
 def edge_response(luminance: ArrayLike) -> EdgeResponse:
     """Measure the sharpness of one straight edge between two even fields.
 
-    Noise scatters the result: 2.4 % for 80 x 80 pixels, a step of 30 dB over the noise and MTF50 at 0.19. From 20 dB
-    down MTF50 is too low: -2 % there, -13 % at 10 dB, over 160 x 160 pixels. Average pictures over seeds first.
+    Noise scatters the result: MTF50 by 2.4 % for 80 x 80 pixels, a step 30 dB above the noise and an MTF50 of 0.19. For
+    steps of 20 dB and less MTF50 is also too low: by 2 % at 20 dB and 13 % at 10 dB, over 160 x 160 pixels. So average
+    pictures over seeds first.
 
     Parameters
     ----------
@@ -60,7 +64,7 @@ def edge_response(luminance: ArrayLike) -> EdgeResponse:
     Raises
     ------
     InputError
-        Where there is no such edge, it leans too little to be oversampled, or comes too near the side.
+        If there is no such edge, or if it leans too little to be oversampled or comes too near the picture's sides.
     """
     picture = _upright(np.asarray(luminance, dtype=np.float64))
     slope, start = _fit_line(picture)
@@ -88,7 +92,7 @@ def _upright(picture: NDArray[np.float64]) -> NDArray[np.float64]:
 def _fit_line(picture: NDArray[np.float64]) -> tuple[float, float]:
     """Return start and slope of the line through the edge, column = start + slope * row.
 
-    It is fitted to the centroids of the rows' derivatives under a Hamming window.
+    The line is fitted to the centroid of each row's derivative under a Hamming window.
     """
     height, width = picture.shape
     derivative = np.diff(picture, axis=1)
@@ -137,7 +141,7 @@ def _line_spread(picture: NDArray[np.float64], slope: float, start: float) -> ND
 def _spectrum(spread: NDArray[np.float64]) -> tuple[Floats, Floats]:
     """Return the frequencies [cycles/px] and the response at each.
 
-    The responses of the derivative, which is 2 bins wide, and of the bin itself are divided out.
+    The response of the derivative's filter, which is 2 bins wide, and that of the bin itself are divided out.
     """
     fine = 8 * spread.size  # padded with zeros, for a finer grid of frequencies
     frequency = np.fft.rfftfreq(fine, 1 / OVERSAMPLING)

@@ -1,4 +1,4 @@
-"""S-CIELAB: colour difference as seen from a distance, where fine noise blurs and colour blurs more than lightness.
+"""S-CIELAB: colour difference as seen from a distance, from which the eye blurs fine noise, and colour more than light.
 
 Source: Zhang & Wandell, "A spatial extension of CIELAB for digital color image reproduction", J. SID 5(1), 1997: XYZ to
 three opponent planes, each blurred by the eye's own spread, back to XYZ, then CIELAB's difference (CIE 1976).
@@ -15,9 +15,9 @@ from rodcone.types import Floats, Image
 # Pixels per degree of a display 3840 pixels and 0.7 m wide, seen from 0.7 m, as by FLIP's default.
 PIXELS_PER_DEGREE = 3840 * np.pi / 180
 
-# Matrix from XYZ to light-dark, red-green and blue-yellow, with the digits of the authors' program. Reprints of the
-# formulas give the 0.077 of the second row a minus; cones (Hunt-Pointer-Estevez) times the weights of the opponent
-# planes give a plus.
+# Matrix from XYZ to light-dark, red-green and blue-yellow, with the digits of the authors' program. In reprints of the
+# formulas the 0.077 of the second row has a minus. The plus is right: it follows from the matrix of the cones
+# (Hunt-Pointer-Estevez) and the weights of the opponent planes.
 XYZ_TO_OPPONENT = np.array(
     [[0.2787336, 0.7218031, -0.1065520], [-0.4487736, 0.2898056, 0.0771569], [0.0859513, -0.5899859, 0.5011089]]
 )
@@ -38,9 +38,9 @@ def eye_transfer(plane: int, cycles_per_degree: Floats) -> Floats:
 def eye_xyz(xyz: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE) -> NDArray[np.float64]:
     """Return XYZ (h, w, 3) after the eye's blur, with the picture mirrored at its borders.
 
-    The blur is a product in the space of cosine transforms, which mirror a picture: it is exact for any spread, even
-    that of 4.3 degrees, and takes O(n log n). Each Gaussian is a product of a factor per row frequency and one per
-    column frequency.
+    The blur is a product in the space of the cosine transform, which mirrors a picture. So it is exact for any spread,
+    even that of 4.3 degrees, and takes O(n log n). Each Gaussian is a product of a factor for the row frequency and one
+    for the column frequency.
     """
     spectrum = scipy.fft.dctn(xyz @ XYZ_TO_OPPONENT.T, axes=(0, 1))
     down, across = (np.arange(n) / (2 * n) * pixels_per_degree for n in xyz.shape[:2])
@@ -56,7 +56,7 @@ def _gaussians(plane: int, cycles_per_degree: Floats) -> Floats:
 
 
 def _weights(plane: int) -> Floats:
-    """Return the weights of an opponent plane's Gaussians, of sum 1."""
+    """Return the weights of an opponent plane's Gaussians; their sum is 1."""
     weights = np.array(SPREADS[plane])[:, 0]
     return np.asarray(weights / weights.sum())
 

@@ -1,6 +1,6 @@
-"""SSIM of Wang, Bovik, Sheikh & Simoncelli 2004, with what one picture needs by itself kept between comparisons.
+"""SSIM of Wang, Bovik, Sheikh & Simoncelli 2004; what depends on one picture alone is kept between comparisons.
 
-Numbers of equations are theirs. Each local mean weighs an 11 x 11 window by a Gaussian of 1.5 pixels.
+Numbers of equations are those of the paper. Each local mean weighs an 11 x 11 window by a Gaussian of 1.5 pixels.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class LocalMoments:
     planes : (3, h, w) float64
         The picture's own values.
     mean, variance : (3, h, w) float64
-        Local ones, equations 14 and 15.
+        Local mean and variance, equations 14 and 15.
     """
 
     planes: Image
@@ -33,14 +33,17 @@ class LocalMoments:
 
 
 def local_moments(picture: NDArray[np.floating]) -> LocalMoments:
-    """Return what SSIM needs of one picture (h, w, 3) of values in [0, 1]."""
+    """Return the moments of one picture (h, w, 3), with values in [0, 1], that SSIM compares."""
     planes = np.ascontiguousarray(np.moveaxis(np.asarray(picture, dtype=np.float64), -1, 0))
     mean = _local_mean(planes)
     return LocalMoments(planes, mean, _local_mean(planes * planes) - mean * mean)
 
 
 def ssim(picture: NDArray[np.floating], truth: LocalMoments) -> float:
-    """Return the mean SSIM over pixels and channels, without the border that a window leaves, where one fits."""
+    """Return the mean SSIM over channels and those pixels whose window lies within the picture.
+
+    If a picture is too small for such pixels, those nearest to its middle count.
+    """
     one = local_moments(picture)
     shared = _local_mean(one.planes * truth.planes) - one.mean * truth.mean  # equation 16
     light = (2 * one.mean * truth.mean + C1) / (one.mean**2 + truth.mean**2 + C1)

@@ -1,5 +1,5 @@
-"""Figures of test targets: where the patches of a chart lie, their colour and noise, how far pairs of them differ, how
-far colours are from those in daylight; sharpness of the slanted edge.
+"""Figures of test targets: the places, colours and noise of a chart's patches, colour differences between pairs of them
+and from daylight, and the sharpness of the slanted edge.
 """
 
 from collections.abc import Iterable
@@ -21,7 +21,7 @@ from scenes.reflectances import color_checker_reflectances
 from studies.metrics.mtf import edge_response
 
 Masks = NDArray[np.bool_]
-INNER = 0.6  # share of a patch's sides that counts; its border holds blurred and mosaicked light of its neighbours
+INNER = 0.6  # share of a patch's side within which pixels count; its border has light of neighbours by blur and mosaic
 
 
 def patch_masks(scene: Scene, shape: tuple[int, int]) -> Masks:
@@ -55,7 +55,7 @@ def patch_masks(scene: Scene, shape: tuple[int, int]) -> Masks:
 
 
 def _inside(place: NDArray[np.float64], focal_px: float, shape: tuple[int, int]) -> Masks:
-    """Return which pixels (h, w) have a centre that sees the inner part of a rectangle.
+    """Return which pixels (h, w) look with their centre at the inner part of a rectangle.
 
     `place` transforms a square of side 2 into the camera's space. The camera looks along +z, +x to its left and +y up:
     pixel (row, column) looks at ((w / 2 - column - 0.5), (h / 2 - row - 0.5), focal_px).
@@ -100,8 +100,8 @@ def patch_colour_errors(picture: NDArray[np.float64], truth: NDArray[np.float64]
     Parameters
     ----------
     picture, truth : (h, w, 3) float64
-        Linear sRGB, not clipped, in which white is 1: in linear light noise averages out, so that colour alone is
-        left; clipping or encoding first would turn noise into a shift.
+        Linear sRGB, not clipped, in which white is 1. In linear light noise averages out, and only colour is left.
+        Clipping or encoding first would turn noise into a shift of colour.
     masks : (patch, h, w) bool
     """
     return np.asarray(skimage.color.deltaE_ciede2000(patch_labs(picture, masks), patch_labs(truth, masks)))
@@ -117,12 +117,12 @@ class TargetFigures:
     Attributes
     ----------
     mtf50_cy_per_px : float or None
-        MTF50 of the slanted edge's luminance (ISO 12233); None also where noise hides the edge.
+        MTF50 of the slanted edge's luminance (ISO 12233); None also if noise hides the edge.
     chart_delta_e_mean : float or None
-        CIEDE2000 between mean colours, mean over the ColorChecker's patches; None where these have under four pixels.
+        Mean over the ColorChecker's patches of CIEDE2000 between mean colours; None if patches have under four pixels.
     patch_snr_db : float or None
-        Mean over deviation of luminance, median over the patches; the render's own noise counts. None also where
-        it isn't finite.
+        Median over the patches of luminance's mean over its standard deviation [dB], which includes the render's noise.
+        None also if it isn't finite.
     """
 
     mtf50_cy_per_px: float | None = None
@@ -136,7 +136,7 @@ def target_figures(scene: str, linear: NDArray[np.float64], truth: NDArray[np.fl
     Parameters
     ----------
     scene : str
-        Name, as a study gives it.
+        Name of the scene in a study.
     linear, truth : (h, w, 3) float64
         sRGB, not clipped; white is 1.
     """
@@ -184,7 +184,7 @@ def pair_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float6
 def true_pair_delta_e(light: str) -> NDArray[np.float64]:
     """Return CIEDE2000 that the CIE observer sees within each pair of the scene metamers under a light, shape (pair,).
 
-    It is computed in closed form in the renderer's bands of 10 nm, adapted to D65 as pictures are.
+    It is computed by formula in the renderer's bands of 10 nm, and adapted to D65 as pictures are.
     """
     surfaces, white = _xyz(light, [curve for pair in pairs() for curve in pair])
     lab = skimage.color.xyz2lab(adapt_to_d65(surfaces / white[1], white))
@@ -194,8 +194,8 @@ def true_pair_delta_e(light: str) -> NDArray[np.float64]:
 def daylight_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
     """Return CIEDE2000 between each patch of a ColorChecker and its colour under D65, shape (patch,).
 
-    The parameters are those of `pair_delta_e`. In both, the white patch has the luminance `WHITE_AT` under its own
-    light: nothing is fitted to the picture.
+    The parameters are those of `pair_delta_e`. In the picture and under D65 the white patch has the luminance
+    `WHITE_AT`; nothing is fitted to the picture.
     """
     return np.asarray(
         skimage.color.deltaE_ciede2000(

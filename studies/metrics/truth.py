@@ -1,4 +1,4 @@
-"""The noise-free picture that others are measured against, and the known scale between the two."""
+"""The noise-free picture against which others are measured, and the known scale of a camera's electrons."""
 
 from dataclasses import dataclass
 from math import ceil
@@ -28,7 +28,7 @@ class Light:
     ----------
     wavelength_nm, width_nm, spectrum : (band,) float64
     lamp : Spectrum
-        The light within the bands, up to a factor.
+        The spectrum from which the bands were averaged, up to a factor.
     """
 
     wavelength_nm: Floats
@@ -58,7 +58,7 @@ def named_light(name: str, window_nm: tuple[float, float] = VISIBLE_NM) -> Light
 
 
 def lit_range(window_nm: tuple[float, float], step_nm: float) -> tuple[float, float]:
-    """Return 380-780 nm, made longer by whole steps until a camera's window is inside."""
+    """Return the range 380-780 nm, extended by whole steps until it contains a camera's window."""
     low, high = VISIBLE_NM
     below, above = (max(ceil(beyond / step_nm), 0) * step_nm for beyond in (low - window_nm[0], window_nm[1] - high))
     return low - below, high + above
@@ -67,8 +67,8 @@ def lit_range(window_nm: tuple[float, float], step_nm: float) -> tuple[float, fl
 def shown_white_cd_m2(transport: Transport, luminance_cd_m2: float | None) -> float:
     """Return the luminance that is shown as white [cd/m^2], for a level of the transport's lights.
 
-    For a level of None the lights have their own powers. Light that is seen directly doesn't count, nor does the part
-    of a pixel that it covers.
+    If `luminance_cd_m2` is None, the lights have their own powers. Lamps that are seen directly don't count, nor do the
+    parts of pixels that they cover.
     """
     return white_of_pixels(transport.scattered_luminance(luminance_cd_m2=luminance_cd_m2), transport.coverage.mean)
 
@@ -79,8 +79,8 @@ def white_of_pixels(luminance: NDArray[np.float64], coverage: NDArray[np.floatin
     Parameters
     ----------
     luminance, coverage : (h, w) array
-        Luminance without light that is seen directly, and the share of each pixel that such light covers, as
-        `render.transport.Transport` has them.
+        Luminance without lamps that are seen directly, and the share of each pixel that such lamps cover, as in
+        `render.transport.Transport`.
     """
     # Without weights NumPy finds the same value by partition instead of sorting, in a tenth of the time.
     weights = 1.0 - coverage.astype(np.float64) if coverage.any() else None
@@ -100,10 +100,10 @@ def true_srgb(radiance: SpectralRadiance, light: Light, white_cd_m2: float) -> N
 def neutral_electrons(sensor: SensorConfig, light: Light, exposure_s: float) -> Floats:
     """Return the expected electrons in each channel's raw pixel from a neutral surface of 1 cd/m^2, shape (channel,).
 
-    Crosstalk is included: these are the means that an even neutral field reads.
+    Crosstalk is included: these are the mean samples of an even neutral field.
 
-    Green's electrons are the known scale: a developed picture divided by them is in cd/m^2, and nothing is taken from
-    the noisy picture.
+    Green's electrons are the known scale: a developed picture, divided by them, is in cd/m^2. The scale doesn't depend
+    on the noisy picture.
     """
     whole = sensor.undivided
     weights = electrons_per_irradiance(whole, light.wavelength_nm, light.width_nm, exposure_s, light.lamp)
