@@ -1,4 +1,4 @@
-"""Expected error of a sensor under a prior over patches, at a level of light: closed form, no render, no pictures."""
+"""Compute the expected error of a sensor's pictures, under a prior over patches, by formula: without any pictures."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -26,17 +26,19 @@ from sensor.readout import spread_charge
 from sensor.response import behind_filters, electrons_per_irradiance
 from studies.metrics.truth import Light, named_light
 
-# Indices, row by row, of the pixels whose error counts: those nearer to a patch's border lack neighbours.
+# Indices, row by row, of the pixels whose error counts. Pixels nearer to a patch's border lack neighbours.
 MIDDLE = np.arange(PATCH**2).reshape(PATCH, PATCH)[2:-2, 2:-2].ravel()
 METERED = 64  # pixels along the side of a frame that is drawn from the prior to meter the exposure
-_LAB_LINEAR = 216 / 24389  # CIE 15: below it the cube root of Lab is replaced by a line
+_LAB_LINEAR = 216 / 24389  # CIE 15: below this value the cube root of Lab is replaced by a line
 _LAB = np.array([[0.0, 116.0, 0.0], [500.0, -500.0, 0.0], [0.0, 200.0, -200.0]])  # L*, a*, b* from roots of X, Y, Z
 _NODES, _SHARES = np.polynomial.hermite_e.hermegauss(40)  # quadrature over a Gaussian
 
 
 @dataclass(frozen=True)
 class ExpectedError:
-    """Expected error under the prior: that of the best estimate if a patch's component is known, and of a linear one.
+    """Expected error under the prior, a mixture of Gaussians, for two estimates of a patch.
+
+    One is the best estimate if the patch's component of the mixture is known, the other is linear.
 
     Attributes
     ----------
@@ -44,11 +46,12 @@ class ExpectedError:
         Mean luminance of the scene.
     exposure_s : float
     psnr_db, linear_psnr_db : float
-        PSNR of encoded sRGB, by the curve's slope, of the estimate with the component known and of the linear one.
+        PSNR of encoded sRGB for the estimate with the known component and for the linear one. The sRGB curve is
+        replaced by its slope.
     luminance_db : float
-        PSNR of encoded luminance alone; component known.
+        PSNR of encoded luminance alone, for the known component.
     lightness, colour : float
-        Root mean square of the error of L*, and of (a*, b*) together, in Lab, linearised; component known.
+        Root mean square error of L*, and of (a*, b*) together, for the known component. Lab is linearised.
     """
 
     luminance_cd_m2: float
@@ -62,15 +65,15 @@ class ExpectedError:
 
 @dataclass(frozen=True, eq=False)
 class LitPrior:
-    """A prior's spectra under a light.
+    """Spectra of a prior's coefficients under a light.
 
     Attributes
     ----------
     light : Light
     basis : (band, coefficient) float64
-        Reflectance of a coefficient of 1 in the light's bands.
+        Reflectance in the light's bands for a coefficient of 1.
     xyz : (3, coefficient) float64
-        XYZ of a coefficient of 1, adapted to D65; reflectance 1 has Y = 1.
+        XYZ for a coefficient of 1, adapted to D65; a reflectance of 1 has Y = 1.
     """
 
     light: Light
@@ -130,8 +133,8 @@ def sampling_of(sensor: SensorConfig, responses: Floats, lens: Floats) -> Floats
 
     It gives the electrons of each sample from the coefficients of each pixel, through lens, filters and crosstalk.
     """
-    # A filter passes light at one pixel and crosstalk moves its charge to neighbours, so a charge has the channel of
-    # the pixel on which its light fell.
+    # Light passes the filter of the pixel on which it falls; then crosstalk moves its charge to neighbours. So a charge
+    # belongs to the channel of the pixel on which its light fell.
     filters = responses[sites_of(sensor.cfa)]
     spread = spread_of(sensor.pixel.crosstalk)
     return np.asarray(np.einsum("st,tp,tc->spc", spread, lens, filters, optimize=True))
@@ -140,7 +143,7 @@ def sampling_of(sensor: SensorConfig, responses: Floats, lens: Floats) -> Floats
 def lens_of(sensor: SensorConfig, blur: bool) -> Floats:
     """Return the share of each pixel's light (second axis) that falls on each pixel of a patch (first axis).
 
-    It is the unit matrix, or with `blur` the lens's at 550 nm.
+    It is the unit matrix, or with `blur` the blur of the sensor's lens at 550 nm.
     """
     points = np.eye(PATCH**2).reshape(-1, PATCH, PATCH)
     if blur:  # diffraction and defocus, as in `sensor.optics.form_image`
@@ -155,7 +158,7 @@ def sites_of(tile: Tile) -> NDArray[np.intp]:
 
 
 def spread_of(crosstalk: float) -> Floats:
-    """Return the share of each pixel's electrons (second axis) that each pixel of a patch collects (first axis)."""
+    """Return the share of each pixel's electrons (second axis) that crosstalk moves to each pixel (first axis)."""
     shape = (PATCH, PATCH)
     return np.stack([spread_charge(one.reshape(shape), crosstalk).ravel() for one in np.eye(PATCH**2)]).T
 
@@ -168,7 +171,7 @@ def expect(
     prior: str = "drawn",
     blur: bool = False,
 ) -> list[ExpectedError]:
-    """Compute the expected error of a sensor's pictures at each level, in closed form.
+    """Compute the expected error of a sensor's pictures at each level by formula.
 
     Parameters
     ----------
@@ -182,7 +185,7 @@ def expect(
     prior : str
         One of `isp.design.spectral_prior.PRIORS`.
     blur : bool
-        Whether diffraction and defocus of the sensor's lens spread the light, at 550 nm, and nobody undoes it.
+        Whether diffraction and defocus of the sensor's lens spread the light, as at 550 nm.
 
     Raises
     ------
@@ -193,7 +196,7 @@ def expect(
     if several(readings := chip_readings(sensor, exposure_s=0.0)):
         count = len(readings)
         raise InputError(f"readings: {count} of a pixel; allowed: none; give [pixel] the well and noise of one of them")
-    if 4 % len(sensor.cfa) or 4 % len(sensor.cfa[0]):  # because the middle of a patch would lack sites of the tile
+    if 4 % len(sensor.cfa) or 4 % len(sensor.cfa[0]):  # the middle of a patch would lack some of the tile's pixels
         raise InputError(f"cfa: {sensor.cfa} isn't 1, 2 or 4 pixels high and wide; allowed: these; give such a tile")
     spectral = load_spectral_prior(prior)
     forms = _forms(prior, light)
@@ -201,7 +204,7 @@ def expect(
     lens = lens_of(sensor, blur)
     sampling = sampling_of(sensor, responses, lens)
     frame_e = np.maximum(drawn_pixels(prior) @ responses.T, 0.0)
-    # With the component known, and with one Gaussian in place of the mixture.
+    # The estimate with the known component, and the linear one, for which one Gaussian replaces the mixture.
     pooled_forms = np.einsum("k,rmkpce->rmpce", spectral.patches.weights, forms)[:, :, None]
     mixtures = ((spectral.patches, forms), (single_gaussian(spectral.patches), pooled_forms))
     by_mixture = [(sampled(patches, sampling, MIDDLE, lens), metrics) for patches, metrics in mixtures]
@@ -237,7 +240,7 @@ def _forms(prior: str, light: str) -> Floats:
 
 @cache
 def drawn_pixels(prior: str) -> Floats:
-    """Draw coefficients of `METERED` x `METERED` pixels from the prior, as a frame from which exposure is metered."""
+    """Draw coefficients of `METERED` x `METERED` pixels from the prior, as a frame on which the exposure is metered."""
     spectral = load_spectral_prior(prior)
     rng = np.random.default_rng(0)
     shape = (METERED, METERED)
@@ -246,7 +249,7 @@ def drawn_pixels(prior: str) -> Floats:
     factors = spectral.patches.factors[component, pixel]
     off = (factors @ rng.standard_normal((*shape, factors.shape[-1], 1)))[..., 0]
     coefficients = (spectral.patches.means[component, pixel] + off) * rng.choice(spectral.reflectances, (*shape, 1))
-    # No surface reflects more light of a wavelength than falls on it, so deep colours are never bright.
+    # No surface reflects more light of a wavelength than it receives, so deep colours are never bright.
     return np.asarray(coefficients / np.maximum(1.0, (coefficients @ spectral.spectra.T).max(axis=-1, keepdims=True)))
 
 

@@ -1,6 +1,6 @@
-"""Figures of colour on the ColorChecker's 24 patches: how far a matrix can take the camera to the standard observer.
+"""Figures of colour on the ColorChecker's 24 patches: how near a matrix can bring the camera to the standard observer.
 
-Noise of a patch's mean adds to its difference of colour, which `without_noise_bias` takes off.
+Noise in a patch's mean enlarges its colour difference; `without_noise_bias` removes this.
 """
 
 from dataclasses import replace
@@ -29,12 +29,12 @@ from studies.score.figure import Definition, Merit, not_measured, without_noise_
 
 GREYS = 6  # number of greys in the chart's last row
 SIDE_PX, CHIPS = 64, 8  # side of a patch [pixels], and number of chips that see it in one measurement
-# A chip takes several frames if its read noise exceeds this share of the converter's top value: as many as bring the
-# noise of their mean down to it, but at most `MOST_FRAMES`.
+# If a camera's read noise exceeds this share of the converter's top value, each chip takes several frames, as many as
+# bring the noise of their mean down to this share, but at most `MOST_FRAMES`.
 FRAMES_SHARE = 0.003
 MOST_FRAMES = 16
 ACROSS, BORDER = 5, 2  # patches in a row, and the border of a patch that crosstalk reaches [pixels]
-WHITE_SHARE = 0.7  # share of the converter's top at which the most sensitive channel reads a perfect white
+WHITE_SHARE = 0.7  # share of the converter's top value that the most sensitive channel reads from a perfect white
 INDEX_FACTOR = 5.5  # ISO 17321-1
 COLOURS = 3  # number of channels that a camera needs to distinguish colours
 INDEX = Merit(
@@ -56,7 +56,7 @@ DIFFERENCE = Merit(
 
 
 def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Definition:
-    """Define the figures of a camera that tells three colours."""
+    """Define the figures of colour; for a camera that can't distinguish three colours they are missing."""
     if len(sensor.channels) < COLOURS:
         missing = f"the mosaic has {', '.join(sensor.channels)} alone, which tells no colours"
         return Definition(tuple(replace(x, missing=missing) for x in (INDEX, DIFFERENCE)), not_measured)
@@ -82,8 +82,8 @@ def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Defin
         lab = xyz2lab(np.clip(balanced @ matrix.T, 0.0, None) @ SRGB_TO_XYZ.T)
         return np.asarray(deltaE_ciede2000(standard_lab, lab)), np.asarray(deltaE_cie76(standard_lab, lab))
 
-    # The same on frames, less the chip's dark. A noisy camera takes several, because its noise would bias the
-    # differences of colour, which aren't linear.
+    # The same on frames, from which a dark frame of the chip is subtracted. A noisy camera takes several frames,
+    # because colour differences aren't linear, so that noise would bias them.
     frames = int(np.clip((plain.read_noise_e / plain.top_e / FRAMES_SHARE) ** 2, 1, MOST_FRAMES))
 
     def means_of(chips: int, rng: np.random.Generator) -> Floats:
@@ -117,7 +117,7 @@ def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Defin
 
 
 def _figures(ciede2000: Floats, cielab: Floats) -> list[float]:
-    """Return the index of the coloured patches, and the mean difference of all."""
+    """Return the sensitivity metamerism index of the coloured patches, and the mean CIEDE2000 of all patches."""
     return [100 - INDEX_FACTOR * float(cielab[:-GREYS].mean()), float(ciede2000.mean())]
 
 
@@ -150,7 +150,7 @@ def _chart_e(sensor: SensorConfig, light: Light, surfaces: Floats, exposure_s: f
 
 
 def _patch_means(samples: Floats) -> Floats:
-    """Return the mean of each patch's samples of a channel, which are nan elsewhere, without the patch's border."""
+    """Return the mean of each patch without its border; `samples` are one channel's, nan at other channels' pixels."""
     height, width = (side // ACROSS for side in samples.shape)
     patches = samples.reshape(ACROSS, height, ACROSS, width).swapaxes(1, 2)[:, :, BORDER:-BORDER, BORDER:-BORDER]
     return np.asarray(np.nanmean(patches, axis=(2, 3)).ravel())

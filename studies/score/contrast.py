@@ -8,7 +8,7 @@ readings. The probability of a reading is
 
 where e are the expected photo-electrons and m those of dark current, whose mean is part of black. P(DN | n) is the
 normal distribution of all other noise, rounded and clipped by the converter. From 1000 electrons on, one normal
-distribution stands for all noise.
+distribution approximates all noise.
 """
 
 from collections.abc import Iterator
@@ -27,14 +27,14 @@ from studies.score.even_field import EvenField, even_field
 from studies.score.figure import Definition, Merit
 
 CONTRAST, TOLERANCE = 0.2, 0.5  # K and d
-EQUAL = 1e-5  # a contrast so far beyond a limit still counts as on it, because many whole readings lie on it
-COUNTED_E = 1000.0  # mean electrons from which on a normal distribution stands for Poisson's
+EQUAL = 1e-5  # a contrast beyond a limit by this or less still counts, because many whole readings lie on a limit
+COUNTED_E = 1000.0  # mean electrons from which on a normal distribution replaces Poisson's
 TAIL = 1e-12  # share of Poisson's distribution that is left out
-LUX = (0.1, 1.0, 10.0, 100.0)  # [lux] on an 18 % grey card that has the pair's mean luminance
+LUX = (0.1, 1.0, 10.0, 100.0)  # illuminance [lux] of an 18 % grey card whose luminance is the pair's mean
 
 
 def contrast_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Iterator[Definition]:
-    """Define the accuracy at each light."""
+    """Define the accuracy at each illuminance in `LUX`."""
     field = even_field(sensor, named_light(light, sensor.window_nm), exposure_s, channel)
     for lux in LUX:
         mean = lux * GREY / pi
@@ -55,7 +55,7 @@ def _measure(field: EvenField, mean_cd_m2: float, rng: np.random.Generator) -> l
 
 
 def accuracy(field: EvenField, mean_cd_m2: float) -> float:
-    """Compute the accuracy in closed form at a pair's mean luminance; NaN for a camera that merges readings."""
+    """Compute the accuracy by formula at a pair's mean luminance; NaN for a camera that merges readings."""
     sides = [reading_distribution(field, mean_cd_m2 * side) for side in (1 + CONTRAST, 1 - CONTRAST)]
     if not all(len(side[0]) for side in sides):
         return float("nan")

@@ -1,7 +1,7 @@
 """Contrast transfer accuracy of pictures: the share of all pairs of pixels that measure the contrast of two patches.
 
-Of a picture by any processor, in numbers in proportion to light. A camera's own samples have a closed form
-(`studies.score.contrast`).
+The picture may be developed by any processor; its values must be proportional to light. For a camera's own samples
+there is a formula (`studies.score.contrast`).
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from rodcone.types import Floats, Plane
 from scenes.contrast_patches import PatchPair, patch_pairs
 from studies.score.contrast import CONTRAST, EQUAL, TOLERANCE
 
-MARGIN = 0.15  # share of a patch's side that is left off on each side
+MARGIN = 0.15  # share of a patch's width and height that isn't measured, at each of its borders
 
 
 @dataclass(frozen=True)
@@ -32,12 +32,12 @@ class PairAccuracy:
 
 
 def chart_accuracy(luminance: Plane, tolerance: float = TOLERANCE) -> list[PairAccuracy]:
-    """Measure a square picture of the scene `contrast_patches`, shape (side, side), in proportion to light.
+    """Measure the accuracy of each pair of patches in a square picture of the scene `contrast_patches`.
 
     Parameters
     ----------
     luminance : (side, side) float64
-        The whole picture, such as `rodcone.luminance_of_srgb` makes of a developed one.
+        The whole picture, proportional to light, such as `rodcone.luminance_of_srgb` of a developed one.
     tolerance : float
         Share by which a contrast that counts as right may differ from the patches' own.
 
@@ -72,15 +72,15 @@ def _patch(luminance: Plane, pair: PatchPair, column: float) -> Plane:
 
 
 def pair_accuracy(bright: Floats, dark: Floats, contrast: float = CONTRAST, tolerance: float = TOLERANCE) -> float:
-    """Return the share of all pairs of a pixel of one patch and a pixel of the other that measure the contrast right.
+    """Return the share of all pairs, one pixel from each of two patches, that measure the contrast right.
 
-    A value has at most the contrast c to a brighter value x if it is at least x (1 - c) / (1 + c). Therefore sorted
-    values are counted, and no pairs are formed.
+    Beside a brighter value x, a value has at most the contrast c if it is at least x (1 - c) / (1 + c). So the pairs
+    are counted in sorted values, without forming them.
     """
     lowest, highest = (contrast * (1 + sign * tolerance) + sign * EQUAL for sign in (-1, 1))
     values = np.sort(np.ravel(dark))
     known = np.ravel(bright)
-    known = known[known > 0]  # the brighter one of a pair with a positive sum is above 0
+    known = known[known > 0]  # a pair that measures a positive contrast has a brighter value above 0
     darkest, brightest = (known * (1 - c) / (1 + c) for c in (highest, lowest))
     right = np.searchsorted(values, brightest, side="right") - np.searchsorted(values, darkest, side="left")
     return float(right.sum() / (np.size(bright) * values.size))

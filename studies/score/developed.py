@@ -1,7 +1,7 @@
-"""Figures of the developed picture, by a processor of the catalogue or a person's own, measured on simulated frames.
+"""Figures of pictures developed by a processor of the catalogue or of one's own, measured on simulated frames.
 
-What a processor does has no closed form. The rows without it (`iso_15739`, `iso_12233`, `iso_19567`, `color_checker`)
-are what the camera gives before a processor.
+No formula says what a processor does. The figures of the camera before a processor are in other groups (`iso_15739`,
+`iso_12233`, `iso_19567`, `color_checker`).
 """
 
 from collections.abc import Callable, Iterator
@@ -41,10 +41,10 @@ from studies.score.texture import LEAST_SAMPLES, SIDE_PX, figures_of, texture_me
 from studies.score.texture_response import texture_response
 from studies.score.visual_noise import STANDARD, WHITE_SHARE, visual_noise
 
-EDGE_PX, PATCH_PX, BORDER_PX = 96, 24, 8  # sides of the edge's picture and of a patch, and the border left off [px]
-RANGE_PX = 48  # side of bright even pictures, of which only the mean counts [pixels]
-BRIGHT_SIDE = slice(BORDER_PX, EDGE_PX // 2 - BORDER_PX)  # columns of the picture of two patches
-DARK_SIDE = slice(EDGE_PX // 2 + BORDER_PX, EDGE_PX - BORDER_PX)
+EDGE_PX, PATCH_PX, BORDER_PX = 96, 24, 8  # sides of the edge's picture and of a patch, and a border that isn't measured
+RANGE_PX = 48  # side of bright even pictures, of which only the mean is measured [pixels]
+BRIGHT_SIDE = slice(BORDER_PX, EDGE_PX // 2 - BORDER_PX)  # columns of the brighter of two patches in one picture
+DARK_SIDE = slice(EDGE_PX // 2 + BORDER_PX, EDGE_PX - BORDER_PX)  # columns of the darker patch
 ACROSS = 5  # patches in a row
 ACCURACY = "IEEE 2020-2024 (there CTA, before CDP), all pairs of pixels of two patches of one picture"
 RANGE = "like ISO 15739:2023, 6.4: brightest value within 1 % of proportion over the dark's temporal noise by its slope"
@@ -79,7 +79,7 @@ def developed_figures(
         return expected_electrons(form_image(grey_radiance(reflectance, lit), camera, samples), camera, exposure_s)
 
     def photograph(reflectance: Floats, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Develop a frame of reflectances, (h, w) of grey or (h, w, band): linear sRGB, a perfect white is 1."""
+        """Photograph and develop reflectances, (h, w) of grey or (h, w, band), as linear sRGB; a perfect white is 1."""
         return developed(expected_e(reflectance), rng, rng)
 
     def developed(light_e: Floats, chip: np.random.Generator, rng: np.random.Generator) -> NDArray[np.float64]:
@@ -181,7 +181,7 @@ def _texture(photograph: Callable[[Plane], NDArray[np.float64]], chart: Plane) -
 
 
 def _chart(surfaces: Floats, side: int) -> Floats:
-    """Lay 24 patches and a white one out in a square of even patches: (h, w, band)."""
+    """Return a chart (h, w, band) of 5 x 5 even patches: the 24 surfaces and, last, a perfect white."""
     patches = np.vstack([surfaces, np.ones_like(surfaces[:1])]).reshape(ACROSS, ACROSS, -1)
     return np.asarray(patches.repeat(side, axis=0).repeat(side, axis=1))
 

@@ -1,4 +1,4 @@
-"""An even neutral field before a camera: the light that it sees, and samples of simulated frames of it."""
+"""A camera that looks at an even neutral field: the light that it sees, and samples of its simulated frames."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,7 +20,7 @@ from sensor.readout import sources_of
 from sensor.response import expected_electrons
 from studies.metrics.truth import Light, neutral_electrons
 
-TEMPORAL = ("read noise", "converter noise", "quantisation", "dark current")  # they change between frames
+TEMPORAL = ("read noise", "converter noise", "quantisation", "dark current")  # dark noise that changes between frames
 SIDE_PX = 128  # side of a frame; a channel in one pixel of four has 4096 samples
 
 
@@ -31,7 +31,7 @@ class EvenField:
     Attributes
     ----------
     sensor : SensorConfig
-        The camera, whose lens has neither falloff nor shake here: the middle of an even field shows none.
+        The camera, with a lens without falloff and shake, because the middle of an even field shows neither.
     light : Light
     exposure_s : float
     channel : str
@@ -68,7 +68,7 @@ class EvenField:
         return expose(self.frame_e * luminance_cd_m2, self.sensor, self.exposure_s, chip, rng)
 
     def samples_e(self, raw: RawImage) -> Floats:
-        """Return the channel's samples of a frame, in electrons of the whole pixel in the whole time."""
+        """Return the channel's samples of a frame [e-], scaled to the whole pixel and the whole exposure time."""
         samples = raw.electrons[mask(raw.cfa, self.channel, raw.shape)]
         return np.asarray(samples / (collected_share(self.readings) if several(self.readings) else 1.0), np.float64)
 
@@ -92,7 +92,7 @@ class EvenField:
 
 
 def even_field(sensor: SensorConfig, light: Light, exposure_s: float, channel: str) -> EvenField:
-    """Put an even neutral field before a camera."""
+    """Return an even neutral field in front of a camera."""
     plain = replace(sensor, lens=replace(sensor.lens, **EVEN_LIGHT, shake_um=0.0, scatter=0.0, eye_age_years=0.0))
     tile_rows, tile_columns = (side * plain.sites for side in (len(plain.cfa), len(plain.cfa[0])))
     radiance = SpectralRadiance(
@@ -108,5 +108,5 @@ def even_field(sensor: SensorConfig, light: Light, exposure_s: float, channel: s
 
 
 def without_blur(sensor: SensorConfig) -> SensorConfig:
-    """Return the camera with a lens that forms the same image of an even field in a hundredth of the time."""
+    """Return the camera without diffraction and defocus: an even field's image is the same, in 1 % of the time."""
     return replace(sensor, lens=replace(sensor.lens, diffraction=0.0, defocus_um=0.0))

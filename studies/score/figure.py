@@ -1,4 +1,4 @@
-"""A figure of merit: what a closed form says, and what repeated measurements on simulated frames say."""
+"""A figure of merit: its value by formula, and its value by repeated measurements on simulated frames."""
 
 import zlib
 from collections.abc import Callable, Sequence
@@ -19,19 +19,19 @@ class Merit:
     Attributes
     ----------
     name : str
-        Name by which `only` asks for it, such as ``iso_12232.noise_speed_10``.
+        Name for the argument `only` of `score`, such as ``iso_12232.noise_speed_10``.
     title, unit : str
     standard : str
         Document that defines it, with the clause where it has one.
     conditions : str
-        What was photographed, and each choice that the standard leaves open.
+        What was photographed, and how each choice that the standard leaves open was made.
     computed : float
-        In closed form; nan where there is none: of the camera, or of what a processor does.
+        Value by formula; nan if there is no formula for this camera, or for a processor.
     measured, low, high : float
-        Mean over simulated measurements, and the limits of its interval of `CONFIDENCE`; nan before it is measured, and
-        the limits of a figure that EMVA 1288 derives from others.
+        Mean over simulated measurements, and the limits of its confidence interval. All are nan before the measurement;
+        the limits stay nan for a figure that EMVA 1288 derives from others.
     missing : str
-        Why the camera doesn't have the figure; empty where it has it.
+        Why the camera doesn't have the figure; empty if it has the figure.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Merit:
 
     @property
     def agrees(self) -> bool | None:
-        """Return whether the closed form lies within the measurement's interval; None where either is missing."""
+        """Return whether the computed value lies within the measurement's interval; None if either is missing."""
         return self.low <= self.computed <= self.high if isfinite(self.low) and isfinite(self.computed) else None
 
 
@@ -58,10 +58,10 @@ class Definition:
     Attributes
     ----------
     merits : tuple of Merit
-        Computed, and not yet measured.
+        Figures that are computed, and not measured yet.
     measure : callable
-        Takes a generator, and returns each figure as one measurement on fresh chips gives it. It isn't called where all
-        figures are missing.
+        Function that makes one measurement on fresh chips with a random generator, and returns each figure's value. It
+        isn't called if all figures are missing.
     """
 
     merits: tuple[Merit, ...]
@@ -69,9 +69,9 @@ class Definition:
 
 
 def measured(definition: Definition, seed: int) -> list[Merit]:
-    """Measure figures `REPEATS` times, and give each mean with its interval by Student's t distribution.
+    """Measure figures `REPEATS` times, and add each mean with its interval by Student's t distribution.
 
-    Figures that the camera doesn't have come back as they are.
+    Figures that the camera doesn't have are returned unchanged.
     """
     if all(merit.missing for merit in definition.merits):
         return list(definition.merits)
@@ -86,21 +86,22 @@ def measured(definition: Definition, seed: int) -> list[Merit]:
 
 
 def stream(name: str) -> int:
-    """Return the number of a figure's own random stream, so that a figure doesn't depend on which others are asked for.
+    """Return the number of a figure's own random stream, by which a figure doesn't depend on the others of a call.
 
-    It is a hash of the whole name, because figures with a common stream would miss their intervals together.
+    It is a hash of the whole name. If figures had a common stream, they would lie outside their intervals together.
     """
     return zlib.crc32(name.encode())
 
 
 def not_measured(rng: np.random.Generator) -> list[float]:
-    """Stand in for the measurement of figures that the camera doesn't have."""
+    """Raise an error: this is the measurement of figures that the camera doesn't have, and is never called."""
     raise AssertionError("a missing figure is measured")
 
 
 def without_noise_bias(whole: Sequence[float], first: Sequence[float], second: Sequence[float]) -> list[float]:
     """Extrapolate figures of the mean of n frames to no noise: 2 E(all) - (E(one half) + E(other half)) / 2.
 
-    Noise adds b / n to a figure that isn't linear in the frame, and b / (n / 2) to that of either half.
+    If a figure isn't linear in the frames, noise adds some b / n to that of the mean of all frames, and b / (n / 2) to
+    that of the mean of either half.
     """
     return [2 * all_frames - (a + b) / 2 for all_frames, a, b in zip(whole, first, second, strict=True)]

@@ -1,4 +1,4 @@
-"""What a lens does to even light: flare onto a black patch in a bright surround, and falloff in the corners."""
+"""Figures of a lens in even light: flare onto a black patch in a bright surround, and falloff in the corners."""
 
 from dataclasses import replace
 from math import nan, radians, tan
@@ -20,7 +20,7 @@ from studies.score.figure import Definition, Merit, not_measured
 from studies.score.sharpness import bands_of
 
 PATCH_PX, BORDER_PX = 32, 2  # the black square's side, and the pixels of its border that crosstalk reaches
-WHITE_SHARE = 0.8  # share of the converter's top value at which a perfect white is read
+WHITE_SHARE = 0.8  # share of the converter's top value that a perfect white reads
 
 
 VIEW_PX = 96, 128  # height and width of the picture whose corners are measured
@@ -28,10 +28,11 @@ CORNER_PX = 16  # side of a corner, and half of the middle's
 
 
 def flare(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Definition:
-    """Define the veiling glare index of a lens that states a share g of evenly scattered light.
+    """Define the veiling glare index of a lens that scatters the share g of its light evenly over the picture.
 
-    A black square takes the share a of a white picture. It reads g (1 - a), and the white 1 - g + g (1 - a). Wings, by
-    the angle from each light, have no closed form on a chart, and are measured alone.
+    A black square covers the share a of a white picture. It reads g (1 - a), and the white 1 - g + g (1 - a). The wings
+    of glare, which depend on the angle from each light, have no formula on a chart; for them the index is only
+    measured.
     """
     glare = sensor.lens.veiling_glare
     lit = glare * (1 - (PATCH_PX / SIDE_PX) ** 2)
@@ -80,10 +81,10 @@ def flare(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> 
 
 
 def corner_illumination(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Definition:
-    """Define the light in the corners over that in the middle, of a lens that states its angle of view.
+    """Define the ratio of the light in the corners to that in the middle, for a lens that states its angle of view.
 
-    At the tangent t of the angle off the axis natural falloff is cos^4 = 1 / (1 + t^2)^2,
-    and what a rim takes multiplies it.
+    With t, the tangent of the angle off the axis, natural falloff is cos^4 = 1 / (1 + t^2)^2. The share that the lens's
+    rim lets through multiplies it.
     """
     lens, (height, width) = sensor.lens, VIEW_PX
     across = tan(radians(lens.horizontal_view_deg / 2))
@@ -127,7 +128,7 @@ def corner_illumination(sensor: SensorConfig, light: str, exposure_s: float, cha
 
 
 def _corners_over_middle(plane: Plane) -> float:
-    """Divide the mean of four corners by that of the middle, which is as large; nan where nothing was measured."""
+    """Return the mean of four corners over that of the middle, which has the same area; nan pixels don't count."""
     ends = slice(None, CORNER_PX), slice(-CORNER_PX, None)
     corners = [plane[rows, columns] for rows in ends for columns in ends]
     rows, columns = (slice(side // 2 - CORNER_PX, side // 2 + CORNER_PX) for side in plane.shape)

@@ -1,4 +1,4 @@
-"""Flicker figures of IEEE 2020: how much a lamp's flicker shows in frames that start at any time of its period."""
+"""Flicker figures of IEEE 2020: how much a lamp's flicker shows in frames that start at random times of its period."""
 
 from dataclasses import replace
 from math import nan
@@ -12,15 +12,15 @@ from sensor.flicker.waveform import waveform
 from studies.score.even_field import EvenField, even_field
 from studies.score.figure import Definition, Merit, not_measured
 
-LAMP, EXPOSURE_S = "metal_halide@100Hz", 0.002  # a lamp on the mains, and a fifth of its period
+LAMP, EXPOSURE_S = "metal_halide@100Hz", 0.002  # a lamp on the mains, and an exposure of a fifth of its period
 FRAMES = 40  # frames per measurement, which start at random moments
-WHITE_SHARE = 0.4  # share of what the largest reading holds, in the lamp's mean light
+WHITE_SHARE = 0.4  # in the lamp's mean light the field fills this share of the largest reading
 
 
 def flicker(plain: EvenField, light: str) -> Definition:
-    """Define the modulation index and the mitigation probability of an even field's camera.
+    """Define the modulation index and the mitigation probability of a camera that looks at an even field.
 
-    In closed form they are those of the exposure and the lamp alone; frames show what the camera makes of them.
+    The formulas depend on the exposure time and the lamp alone; the measurement on frames includes the camera.
     """
     lamp = waveform(LAMP)
     known = flicker_figures(lamp, EXPOSURE_S)

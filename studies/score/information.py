@@ -1,14 +1,14 @@
 """Figures of information from a slanted edge: noise equivalent quanta, an ideal observer's ratio, and capacity.
 
-As Koren (Electronic Imaging 2024) has them of an edge with levels b and d, a transfer M(f) and white noise of variance
-n per pixel, f in cycles per pixel:
+Koren (Electronic Imaging 2024) defines them for an edge with levels b and d, a transfer M(f) and white noise of
+variance n per pixel, with f in cycles per pixel:
 
     noise equivalent quanta   q(f) = ((b + d) / 2)^2 M(f)^2 / n
     ideal observer's ratio    s^2 = (b - d)^2 integral |G|^2 M^2 / n    over both axes up to Nyquist,
     capacity                  c = integral from 0 to 1/2 of 2 pi f log2(1 + (b - d)^2 M(f)^2 / (12 n)).
 
-G is the Fourier transform of a square object. The 12 comes from signals that are spread evenly between d and b, whose
-variance is (b - d)^2 / 12.
+G is the Fourier transform of a square object. The 12 comes from signals that are uniformly distributed between d and b,
+whose variance is (b - d)^2 / 12.
 """
 
 from math import log10
@@ -24,7 +24,7 @@ STEPS = 400  # steps of each integral from 0 to Nyquist
 
 
 def information(frequency: Floats, mtf: Floats, bright_e: float, dark_e: float, noise_e2: float) -> list[float]:
-    """Return the quanta at half Nyquist, the observer's ratio [dB] and the capacity [bits per pixel]."""
+    """Return the quanta at half Nyquist, the ideal observer's ratio [dB] and the capacity [bits per pixel]."""
     middles = (np.arange(STEPS) + 0.5) / (2 * STEPS)
     power = np.interp(middles, frequency, mtf) ** 2 / noise_e2
     quanta = ((bright_e + dark_e) / 2 * float(np.interp(0.25, frequency, mtf))) ** 2 / noise_e2
@@ -40,7 +40,7 @@ def information(frequency: Floats, mtf: Floats, bright_e: float, dark_e: float, 
 
 
 def information_merits(words: str, figures: list[float]) -> tuple[Merit, ...]:
-    """Name the three figures."""
+    """Return the three figures as merits, under the conditions `words`."""
     return (
         Merit(
             "information.neq_half_nyquist",

@@ -1,4 +1,4 @@
-"""How far a light goes in the window of a camera that sees more than 380-780 nm, and figures that it can't give."""
+"""Cameras that see beyond 380-780 nm: figures that a light can't give because its table of wavelengths ends earlier."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -16,7 +16,7 @@ EVERYWHERE = "E"  # the light of equal energy over 300-1100 nm, for which the sa
 
 
 def unlit(sensor: SensorConfig, light: str) -> str:
-    """Say why a light gives a camera's unit channel nothing; empty where it gives something."""
+    """Say why a camera's unit channel collects nothing under a light; return an empty text if it collects some."""
     electrons = neutral_electrons(sensor, named_light(light, sensor.window_nm), 1.0)
     if electrons[sensor.channels.index(sensor.unit_channel)] > 0:
         return ""
@@ -25,7 +25,7 @@ def unlit(sensor: SensorConfig, light: str) -> str:
 
 
 def without_light(definitions: Iterable[Definition], reason: str) -> Iterator[Definition]:
-    """Leave out the figures of a light that gives the camera nothing; SNR1s stays, because it has a lamp of its own."""
+    """Mark figures as missing under a light that gives the camera nothing; keep SNR1s, which has a lamp of its own."""
     for definition in definitions:
         if definition.merits[0].name.startswith("snr1s."):
             yield definition
@@ -35,7 +35,7 @@ def without_light(definitions: Iterable[Definition], reason: str) -> Iterator[De
 
 
 def with_reach(definition: Definition, sensor: SensorConfig, light: str) -> Definition:
-    """State in the conditions of a light's figures where the light's table ends before the camera's window does."""
+    """Add to the conditions of figures where the light's table ends, if that is before the camera's window does."""
     return replace(definition, merits=tuple(_told(merit, sensor, light) for merit in definition.merits))
 
 

@@ -1,7 +1,7 @@
 """Figures of signal and noise on even fields: speeds, dynamic range, signal-to-noise ratios, light for a ratio.
 
-The signal is the raw one of a single channel. Where a standard asks for the developed picture's luminance, that is a
-choice which `Merit.conditions` states.
+The signal is the raw signal of a single channel. Some standards want the developed picture's luminance instead; their
+`Merit.conditions` state this choice.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -21,19 +21,19 @@ from studies.score.even_field import EvenField, even_field
 from studies.score.figure import Definition, Merit
 from studies.study.gain import ISO_SATURATION_LUX_S
 
-ISO_NOISE_LUX_S = 10.0  # the noise-based speed is this over the exposure with the signal-to-noise ratio
-REFERENCE_SHARE = 0.13  # share of the saturation luminance at which ISO 15739 measures the ratio
+ISO_NOISE_LUX_S = 10.0  # the noise-based speed is this over the exposure that has the required signal-to-noise ratio
+REFERENCE_SHARE = 0.13  # share of the saturation luminance at which ISO 15739 measures the signal-to-noise ratio
 RAMP_TOP = 0.65  # light of the grey scale's brightest patch, as a share of saturation
 # Light of the 12 patches of ISO 14524's grey scale, whose contrast is 100, over the saturation light.
 RAMP: Floats = RAMP_TOP / BRIGHTEST * np.array(grey_scale(12, 100.0))
-# Percentile of an overexposed field's samples that counts as saturated, the converter's top value. Noise leaves half of
-# the samples below it.
+# This percentile of an overexposed field's samples is the saturation value. The mean would be lower, because noise
+# leaves half of the samples below the converter's top value.
 SATURATED_PERCENT = 95.0
-LADDER = (0.94, 0.97, 1.0, 1.03, 1.06)  # factors on the closed form's light, among which a figure is searched
+LADDER = (0.94, 0.97, 1.0, 1.03, 1.06)  # factors on the computed light; a figure is measured at each
 SNR1S = ("3200 K", 1 / 60, 1.4)  # colour temperature, exposure time and f-number of SNR1s
 
 
-Named = tuple[Merit, Callable[[float], float]]  # a figure without its value, and its value by luminance
+Named = tuple[Merit, Callable[[float], float]]  # a figure without its value, and a function from luminance to value
 
 
 def noise_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Iterator[Definition]:
@@ -64,7 +64,7 @@ def noise_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: 
 
 
 def _conversion(field: EvenField, light: str) -> Definition:
-    """Define slope and gamma of the conversion, and the speed that follows from them."""
+    """Define slope and gamma of the opto-electronic conversion, and the speed that follows from the slope."""
     e_per_lux_s = field.electrons_per_cd_m2 / field.lux_s_per_cd_m2
     scale = (
         f"{field.channel}, raw, a grey scale of {len(RAMP)} patches from {100 * RAMP[-1]:.2g} to {100 * RAMP[0]:.0f} % "
@@ -99,7 +99,7 @@ def _conversion(field: EvenField, light: str) -> Definition:
 
 
 def field_words(field: EvenField, light: str) -> str:
-    """Say what an even field's figures are measured on."""
+    """Return the conditions under which an even field's figures are measured, in words."""
     return (
         f"{field.channel}, raw samples of one pixel, {light}, {field.exposure_s * 1e3:.4g} ms, fixed patterns included"
     )
@@ -134,7 +134,7 @@ def _saturation_speed(field: EvenField, e_per_lux_s: float) -> float:
 
 
 def response_figures(field: EvenField, read_e: Floats) -> tuple[float, float]:
-    """Fit what the grey scale's patches read: its slope [e-/(lux s)], and that of its logarithm over the light's."""
+    """Return the slope of the grey scale's readings over light [e-/(lux s)], and the slope between their logarithms."""
     lux_s = RAMP * field.headroom_e / field.electrons_per_cd_m2 * field.lux_s_per_cd_m2
     slope = np.polyfit(lux_s, read_e, 1)[0]
     gamma = np.polyfit(np.log(lux_s), np.log(np.maximum(read_e, 1e-9)), 1)[0]
@@ -142,7 +142,7 @@ def response_figures(field: EvenField, read_e: Floats) -> tuple[float, float]:
 
 
 def _expected_e(field: EvenField, collected_e: Floats) -> Floats:
-    """Return what is read of photo-electrons without noise and less the dark, which a bent response changes."""
+    """Return the noise-free readings of photo-electrons, less that of the dark; they differ for a bent response."""
     if several(field.readings):
         return collected_e
     (reading,) = field.readings
@@ -154,7 +154,7 @@ def _expected_e(field: EvenField, collected_e: Floats) -> Floats:
 
 
 def _measured_e(field: EvenField, rng: np.random.Generator) -> Floats:
-    """Measure what a chip reads of the grey scale's patches, less what it reads in the dark."""
+    """Measure a chip's mean readings of the grey scale's patches, less its mean reading in the dark."""
     chip = field.draw_chip(rng)
     light = (0.0, *(RAMP * field.headroom_e / field.electrons_per_cd_m2).tolist())
     means_e: Floats = np.array([field.samples_e(field.shoot(x, chip, rng)).mean() for x in light])
@@ -162,7 +162,7 @@ def _measured_e(field: EvenField, rng: np.random.Generator) -> Floats:
 
 
 def ratio_at(field: EvenField, luminance: float, rng: np.random.Generator) -> float:
-    """Measure the ratio of mean to standard deviation of one frame's samples, of a fresh chip."""
+    """Measure the ratio of mean to standard deviation of one frame's samples, on a fresh chip."""
     samples = field.samples_e(field.shoot(luminance, field.draw_chip(rng), rng))
     return float(samples.mean() / samples.std(ddof=1))
 
@@ -196,9 +196,11 @@ def _light_for_ratio(field: EvenField, ratio: float, figures: Sequence[Named]) -
 
 
 def light_for(measured_at: Callable[[float], float], goal: float, about_cd_m2: float) -> float:
-    """Measure a figure on a ladder of light, and solve a line through it in logarithms for the light [cd/m^2].
+    """Return the light [cd/m^2] at which a figure is `goal`, from measurements at the steps of `LADDER`.
 
-    The ladder is narrow, so that a merge's seam is straight on it. A light beyond the ladder counts as its end.
+    A line through the figure's logarithm over that of the light is solved for the goal. The ladder around `about_cd_m2`
+    is so narrow that the figure is straight on it, even where a merge passes from one reading to another. The result
+    lies within the ladder.
     """
     light = np.log(np.array(LADDER))
     figures = np.log([measured_at(about_cd_m2 * x) for x in LADDER])
@@ -209,7 +211,7 @@ def light_for(measured_at: Callable[[float], float], goal: float, about_cd_m2: f
 
 
 def _snr1s(sensor: SensorConfig, channel: str) -> Definition:
-    """Define Sony's SNR1s: the illuminance of 18 % grey in which the signal equals its temporal noise."""
+    """Define Sony's SNR1s: the illuminance in which the signal of 18 % grey equals its temporal noise."""
     lamp, exposure_s, f_number = SNR1S
     seen = replace(sensor, lens=replace(sensor.lens, f_number=f_number, magnification=0.0))
     field = even_field(seen, named_light(lamp, sensor.window_nm), exposure_s, channel)

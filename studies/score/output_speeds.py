@@ -1,7 +1,7 @@
-"""Speeds of ISO 12232 that are stated of a whole camera: standard output sensitivity and recommended exposure index.
+"""Speeds of ISO 12232 for a camera with its tone curve: standard output sensitivity and recommended exposure index.
 
-Both are of one channel's samples, shown by the sRGB curve with the top of the range as white. A camera of another tone
-curve has another standard output sensitivity.
+Both are measured on one channel's samples, encoded by the sRGB curve with the top of the range as white. A camera with
+another tone curve has another standard output sensitivity.
 """
 
 from collections.abc import Iterator
@@ -30,8 +30,8 @@ def output_speeds(field: EvenField, words: str) -> Iterator[Definition]:
         return ISO_NOISE_LUX_S / (luminance * field.lux_s_per_cd_m2)
 
     def measure_output(rng: np.random.Generator) -> list[float]:
-        # The decoded output is a straight line over light in logarithms. The sRGB curve isn't, and its bend would lower
-        # the speed by 5e-5.
+        # In logarithms, the decoded output over light is a straight line. The encoded one isn't; its bend would lower
+        # the speed by a share of 5e-5.
         found = light_for(lambda x: decoded(_measured_output(field, x, rng)), decoded(OUTPUT), at_output)
         return [speed(found)]
 
@@ -65,7 +65,7 @@ def output_speeds(field: EvenField, words: str) -> Iterator[Definition]:
 
 
 def mean_output(field: EvenField, luminance_cd_m2: float) -> float:
-    """Return the mean sRGB value of samples of a luminance, which their noise lowers: the curve is concave."""
+    """Return the mean sRGB value of samples of a luminance; noise lowers it, because the sRGB curve is concave."""
     mean_e = luminance_cd_m2 * field.electrons_per_cd_m2
     noise_e = mean_e / float(snr(np.array([mean_e]), field.sensor, field.exposure_s, field.channel)[0])
     shown = encode_srgb((mean_e + noise_e * NODES) / field.headroom_e)

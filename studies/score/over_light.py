@@ -1,4 +1,4 @@
-"""Signal-to-noise ratio, accuracy of contrast and visual noise over light, in closed form beside simulated frames."""
+"""Signal-to-noise ratio, accuracy of contrast and visual noise over light, by formula and on simulated frames."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,25 +15,26 @@ from studies.score.contrast import accuracy, accuracy_on_frames
 from studies.score.even_field import EvenField, even_field
 from studies.score.visual_noise import colour_fields, expected_noise, measured_noise
 
-LEAST_RATIO = 3.0  # SNR of the noisiest channel from which on visual noise has a closed form
+LEAST_RATIO = 3.0  # the formula for visual noise holds if the noisiest channel's SNR is at least this
 LUX: tuple[float, ...] = tuple(float(f"{10 ** (step / 3):.3g}") for step in range(-6, 13))  # 0.01 to 10 000
 
 
 @dataclass(frozen=True)
 class AtLight:
-    """Figures in one light.
+    """Figures at one illuminance.
 
     Attributes
     ----------
     lux : float
         Illuminance of an 18 % grey card.
     snr_db, measured_snr_db : float
-        Ratio of a pixel's samples of the card, in closed form and on one simulated frame; nan where the well is full.
+        Signal-to-noise ratio of a pixel that sees the card, by formula and on one simulated frame; nan if the well is
+        full.
     accuracy, measured_accuracy : float
         Contrast transfer accuracy (`studies.score.contrast`).
     visual_noise, measured_visual_noise : float
-        Visual noise of the card beside a perfect white (`studies.score.visual_noise`); nan where a well is full and for
-        a camera that tells no colours, and in closed form where the grey's ratio is below `LEAST_RATIO`.
+        Visual noise of the card beside a perfect white (`studies.score.visual_noise`); nan if a well is full or the
+        camera can't distinguish colours. `visual_noise` is also nan if the grey's ratio is below `LEAST_RATIO`.
     """
 
     lux: float
@@ -67,7 +68,7 @@ def over_light(
 
 
 def _colours(sensor: SensorConfig, light: str, exposure_s: float) -> tuple[list[EvenField], Floats] | None:
-    """Return the fields and the matrix that visual noise is measured with; None if the camera tells no colours."""
+    """Return the fields and the matrix for visual noise; None if the camera can't distinguish three colours."""
     try:
         return colour_fields(sensor, light, exposure_s) if len(sensor.channels) >= 3 else None
     except InputError:
@@ -77,7 +78,7 @@ def _colours(sensor: SensorConfig, light: str, exposure_s: float) -> tuple[list[
 def _visual_noise(
     fields: Sequence[EvenField], matrix: Floats, white_cd_m2: float, rng: np.random.Generator
 ) -> tuple[float, float]:
-    """Return visual noise in closed form and on frames; NaN in the dark, and where a channel is full."""
+    """Return visual noise by formula and on frames; NaN in the dark, and if a channel is full."""
     electrons = [GREY * white_cd_m2 * field.electrons_per_cd_m2 for field in fields]
     if white_cd_m2 <= 0 or any(e >= field.headroom_e for e, field in zip(electrons, fields, strict=True)):
         return nan, nan

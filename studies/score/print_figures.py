@@ -1,7 +1,7 @@
-"""Figures like those that test houses print of cameras: dynamic range in stops, colours in bits, low-light speed, PDR.
+"""Figures like those that camera testers publish: dynamic range in stops, colours in bits, low-light speed, PDR.
 
-The definitions are the published ones, per pixel: the houses scale them to a print of 8 megapixels, and a sensor file
-states no number of pixels. None of them is the houses' own score.
+They follow the published definitions, but per pixel. The testers scale them to a print of 8 megapixels, which isn't
+possible here, because a sensor file states no number of pixels. None of them is a tester's own score.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -26,13 +26,13 @@ from studies.study.gain import ISO_SATURATION_LUX_S
 GREY_SHARE = 0.18  # share of saturation at which the low-light speed's ratio is measured
 LEAST_DB, LEAST_STOPS, LEAST_BITS = 30.0, 9.0, 18.0  # what the low-light speed requires
 WHITE_SHARE = 0.9  # share of saturation up to which colours are counted; above it noise is clipped
-NODES = (10, 4)  # nodes of the integral in the first step of levels, and in each step beyond a seam of the readings
-LADDER = (0.9, 0.95, 1.0, 1.05, 1.1)  # factors on the closed form's gain
+NODES = (10, 4)  # nodes of the integral up to the first seam between merged readings, and in each part beyond a seam
+LADDER = (0.9, 0.95, 1.0, 1.05, 1.1)  # factors on the computed gain; the margin is measured at each
 CONFUSION_UM, PDR_RATIO = 22.0, 20.0  # circle on a sensor of 36 x 24 mm, and the SNR in it
 
 
 def print_figures(field: EvenField, words: str) -> Iterator[Definition]:
-    """Define the figures of an even field's channel, and of the three channels that tell colours."""
+    """Define the figures of an even field's channel, and those of the three channels that distinguish colours."""
     like = "like a test house's"
     stops = Merit(
         "print.landscape",
@@ -78,7 +78,7 @@ def _of_range(field: EvenField, ratio: float, merit: Merit) -> Definition:
 
 
 def _low_light(field: EvenField, like: str, words: str) -> Definition:
-    """Define the highest speed by gain at which ratio, range and colours all suffice."""
+    """Define the highest speed, set by the gain, at which SNR, dynamic range and bits of colour are all sufficient."""
     colour = f", {LEAST_BITS:g} bits of colour" if len(_colours(field)) == 3 else ""
     merit = Merit(
         "print.sports",
@@ -125,7 +125,7 @@ def _at(field: EvenField, gain: float) -> EvenField:
 
 
 def _margins(field: EvenField) -> list[float]:
-    """Return by how many dB, stops and bits a camera exceeds what the low-light speed requires."""
+    """Return by how many dB, stops and (for three colours) bits a camera exceeds what the low-light speed requires."""
     grey_e = np.array([GREY_SHARE * field.headroom_e])
     ratio = float(snr(grey_e, field.sensor, field.exposure_s, field.channel)[0])
     margins = [20 * log10(ratio) - LEAST_DB, _stops(field, 1.0) - LEAST_STOPS]
@@ -144,7 +144,7 @@ def _stops(field: EvenField, ratio: float) -> float:
 
 
 def _measured_stops(field: EvenField, ratio: float, rng: np.random.Generator) -> float:
-    """Measure the range in stops: what an overexposed field reads over what a field with the given ratio reads."""
+    """Measure the range in stops: the reading of an overexposed field over that of a field with the given SNR."""
     about = electrons_at_snr(ratio, field.sensor, field.exposure_s, field.channel) / field.electrons_per_cd_m2
     found = light_for(lambda x: ratio_at(field, x, rng), ratio, about)
     bright = field.shoot(1.3 * field.headroom_e / field.electrons_per_cd_m2, field.draw_chip(rng), rng)
@@ -153,21 +153,21 @@ def _measured_stops(field: EvenField, ratio: float, rng: np.random.Generator) ->
 
 
 def _colours(field: EvenField) -> Sequence[str]:
-    """Return the three channels that tell colours; none if the light doesn't reach all of them."""
+    """Return the three channels that distinguish colours; none if there are fewer, or one gets no light."""
     return field.sensor.channels[:3] if len(field.means_e) >= 3 and np.all(field.means_e[:3] > 0) else ()
 
 
 def _white_cd_m2(field: EvenField) -> float:
-    """Return the luminance of white, at which the first of the three channels is full to `WHITE_SHARE` [cd/m^2]."""
+    """Return the luminance [cd/m^2] at which the first of the three channels to fill is full to `WHITE_SHARE`."""
     channels = (replace(field, channel=name) for name in _colours(field))
     return min(WHITE_SHARE * one.headroom_e / one.electrons_per_cd_m2 for one in channels)
 
 
 def _bits(field: EvenField) -> float:
-    """Return the bits of colour: log2 of the product of the three channels' integrals of 1 / noise over the signal.
+    """Return the bits of colour: log2 of the product of three integrals, each of 1 / noise over a channel's signal.
 
-    A matrix between the channels cancels in that product. With the signal s = t u^2, each integral is 2 t u / noise
-    over u from 0 to 1.
+    A matrix that mixes the channels cancels in that product. With the signal s = t u^2, where t is the signal of white,
+    each integral is that of 2 t u / noise over u from 0 to 1.
     """
     return _bits_of(field, _noise_e)
 
@@ -191,7 +191,7 @@ def _measured_bits(field: EvenField, rng: np.random.Generator) -> float:
 
 
 def _steps(field: EvenField, top_e: float) -> Floats:
-    """Return the ends of the steps of u from 0 to 1 within which noise doesn't jump, as it does at a merge's seams."""
+    """Return values of u from 0 to 1 between which noise doesn't jump; it jumps at the seams of merged readings."""
     handovers_e = seams(field.readings).handover_e[:-1] if several(field.readings) else np.empty(0)
     return np.unique([0.0, *np.sqrt(np.clip(handovers_e / top_e, 0.0, 1.0)), 1.0])
 

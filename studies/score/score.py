@@ -1,4 +1,4 @@
-"""Merit a camera: every figure in closed form beside the same figure measured on simulated frames."""
+"""Score a camera: compute every figure of merit by formula, and measure the same figure on simulated frames."""
 
 from collections.abc import Iterator, Sequence
 from math import nan
@@ -45,7 +45,7 @@ GROUPS = (
     "emva_1288",
     "developed",
 )
-Processing = tuple[str, bool]  # a processor, and the consent to run it where it is a file
+Processing = tuple[str, bool]  # a processor, and whether the user consents to run it if it is a file
 NORMAL_95 = 1.959964  # half the width of a 95 % interval, in standard errors
 
 
@@ -68,9 +68,9 @@ def score(
     light : str
         Illuminant of all figures whose definition doesn't name another one.
     exposure_s : float
-        Exposure time of the same [s].
+        Exposure time of those figures [s].
     only : sequence of str
-        Groups, such as ``iso_12232``, or whole names; all figures by default.
+        Groups of figures, such as ``iso_12232``, or whole names of figures; all figures by default.
     seed : int
         Seed of the chips and frames.
     processor : str, optional
@@ -83,8 +83,8 @@ def score(
     Returns
     -------
     list of Merit
-        `Merit.missing` says why a camera doesn't have a figure: colours of fewer than three channels, light for a ratio
-        that no light reaches, flare of a lens that states none.
+        The figures. `Merit.missing` says why a camera doesn't have one: colours with fewer than three channels, light
+        for a ratio that no light reaches, flare for a lens that states none.
 
     Raises
     ------
@@ -135,12 +135,12 @@ def _group_wanted(group: str, only: Sequence[str]) -> bool:
 def definitions(
     sensor: SensorConfig, light: str, exposure_s: float, only: Sequence[str], processor: Processing | None = None
 ) -> Iterator[Definition]:
-    """Define the figures of the groups that are asked for, EMVA's excepted; each is computed and not yet measured.
+    """Define the figures of the requested groups, except EMVA's; each is computed, and not measured yet.
 
     Raises
     ------
     InputError
-        For a camera that no light of the program reaches.
+        For a camera that collects nothing under any light of the program.
     """
     if only and all(name.partition(".")[0] == "emva_1288" for name in only):
         return

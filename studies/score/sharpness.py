@@ -1,4 +1,4 @@
-"""Figures of sharpness by a slanted edge: lens, pixel aperture and crosstalk in closed form beside measured edges."""
+"""Figures of sharpness from a slanted edge: lens, pixel aperture and crosstalk by formula, and measured edges."""
 
 from dataclasses import replace
 
@@ -25,19 +25,19 @@ from studies.score.figure import Definition, Merit, without_noise_bias
 from studies.score.information import information, information_merits
 
 SIDE_PX = 192
-QUARTER_PX = SIDE_PX // 4  # columns at either side, in which the noise is measured
+QUARTER_PX = SIDE_PX // 4  # columns at the left and right border in which the noise is measured
 ANGLE_DEG, CONTRAST = 5.0, 4.0  # angle and contrast of ISO 12233's edge
 FRAMES = 8  # number of frames, each by a chip of its own, that are averaged, because noise lowers the measured MTF50
 BRIGHT_SHARE = 0.6  # share of the full well on the edge's bright side
 BAND_NM = 20.0
-GRID: Floats = np.arange(-6000, 6001) / 2000.0  # frequencies of the closed form [cycles per pixel]
+GRID: Floats = np.arange(-6000, 6001) / 2000.0  # frequencies at which the transfer is computed [cycles per pixel]
 # Relative contrast sensitivity of IEEE 1858 (CPIQ): v^0.8 exp(-0.2 v), v in cycles per degree.
 CSF_POWER, CSF_DECAY = 0.8, 0.2
 
 
 def sharpness(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Definition:
-    """Define the figures of an edge that one channel sees at every pixel."""
-    # The camera, and the edge in closed form.
+    """Define the figures of an edge that one channel sees, if every pixel has its filter."""
+    # The camera, and the edge by formula.
     seen = every_pixel(sensor, channel)
     bands = bands_of(light, sensor.window_nm)
     edge_e = _edge_electrons(seen, bands, exposure_s)
@@ -99,7 +99,7 @@ def sharpness(sensor: SensorConfig, light: str, exposure_s: float, channel: str)
 
 
 def every_pixel(sensor: SensorConfig, channel: str) -> SensorConfig:
-    """Return the camera whose every pixel is the channel's, with a lens that an even part of the picture sees."""
+    """Return the camera with the channel's filter at every pixel, and a lens without falloff, glare and shake."""
     plain = with_tile(sensor, (channel,), sensor.responses)
     return replace(
         plain, lens=replace(plain.lens, **EVEN_LIGHT, shake_um=0.0, veiling_glare=0.0, scatter=0.0, eye_age_years=0.0)
@@ -107,7 +107,7 @@ def every_pixel(sensor: SensorConfig, channel: str) -> SensorConfig:
 
 
 def bands_of(light: str, window_nm: tuple[float, float]) -> Light:
-    """Return a named illuminant of 1 cd/m^2 in the bands of pictures, as far as a camera's window opens."""
+    """Return a named illuminant of 1 cd/m^2 in bands of `BAND_NM` that cover a camera's window."""
     first_nm, last_nm = lit_range(window_nm, BAND_NM)
     centres = np.arange(first_nm + BAND_NM / 2, last_nm, BAND_NM)
     return light_in_bands(illuminant(light), centres, np.full(centres.size, BAND_NM))
@@ -122,12 +122,12 @@ def _edge_electrons(sensor: SensorConfig, bands: Light, exposure_s: float) -> Fl
 
 
 def edge_reflectance(side: int) -> Floats:
-    """Return reflectances of an edge through the middle of side x side squares, 1 on its bright side."""
+    """Return the reflectances of side x side squares with an edge through their middle; 1 on its bright side."""
     return np.asarray((1 + (CONTRAST - 1) * edge_coverage(side)) / CONTRAST)
 
 
 def grey_radiance(reflectance: Floats, bands: Light) -> SpectralRadiance:
-    """Light a chart of reflectances, (h, w) of grey or (h, w, band)."""
+    """Return the radiance of a chart of reflectances, (h, w) of grey or (h, w, band), in a light."""
     lit = reflectance if reflectance.ndim == 3 else reflectance[..., None]
     values = (lit * bands.spectrum).astype(np.float32)
     return SpectralRadiance(values, bands.wavelength_nm, width_nm=bands.width_nm, light=bands.lamp)
@@ -167,9 +167,9 @@ def transfer_at(sensor: SensorConfig, bands: Light, exposure_s: float, along: Fl
 
 
 def _windowed(transfer: Floats) -> tuple[Floats, Floats]:
-    """Return frequencies up to 1 cycle per pixel, and the transfer as the standard's Hamming window shows it.
+    """Return frequencies up to 1 cycle per pixel, and the transfer as measured under the standard's Hamming window.
 
-    The window on the line spread, 2 R wide, is a convolution of its transfer with
+    Multiplying the line spread by the window, 2 R wide, convolves its transfer with
 
         1.08 sinc(2 R f) + 0.46 (sinc(2 R f - 1) + sinc(2 R f + 1)).
     """
@@ -183,7 +183,7 @@ def _windowed(transfer: Floats) -> tuple[Floats, Floats]:
 
 
 def acutance(frequency: Floats, mtf: Floats) -> float:
-    """Return the integral of sensitivity x transfer over that of the sensitivity, both up to Nyquist."""
+    """Return the integral of the eye's sensitivity x transfer over that of the sensitivity, both up to Nyquist."""
     grid = np.linspace(0.0, 0.5, 501)
     per_degree = grid * PIXELS_PER_DEGREE
     sensitivity = per_degree**CSF_POWER * np.exp(-CSF_DECAY * per_degree)

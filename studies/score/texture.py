@@ -1,4 +1,4 @@
-"""Texture: what lens, pixel aperture and crosstalk leave of dead leaves, in closed form beside simulated frames."""
+"""Texture: contrast that lens, pixel aperture and crosstalk leave in dead leaves, computed and on simulated frames."""
 
 from dataclasses import replace
 from math import isfinite
@@ -20,11 +20,11 @@ from studies.score.texture_response import TextureResponse, expected_response, t
 
 SIDE_PX = 96
 LEAST_SAMPLES = 4  # least samples of the chart along a side of a pixel
-WHITE_SHARE = 0.6  # share of the full well for a perfect white
+WHITE_SHARE = 0.6  # share of the full well that a perfect white fills
 
 
 def texture(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Definition:
-    """Define the figures of dead leaves that one channel sees at every pixel."""
+    """Define the figures of dead leaves that one channel sees, if every pixel has its filter."""
     seen = every_pixel(sensor, channel)
     bands = bands_of(light, sensor.window_nm)
     samples = max(least_samples(seen), LEAST_SAMPLES)
@@ -51,7 +51,7 @@ def texture(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -
 
 
 def texture_merits(group: str, title: str, words: str, figures: list[float]) -> tuple[Merit, ...]:
-    """Name the three figures of a texture's response."""
+    """Return the three figures of a texture's response as merits, under the conditions `words`."""
     like = "like ISO/TS 19567-2: dead leaves, by the spectrum that picture and chart share"
     seen = f"{words}; seen at {PIXELS_PER_DEGREE:.0f} pixels per degree"
     return (

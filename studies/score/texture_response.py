@@ -1,4 +1,4 @@
-"""What a camera transfers of a chart of dead leaves (`scenes.dead_leaves`), by frequency."""
+"""Measure by frequency how much contrast a camera transfers from a chart of dead leaves (`scenes.dead_leaves`)."""
 
 from dataclasses import dataclass
 
@@ -18,11 +18,11 @@ class TextureResponse:
 
 
 def texture_response(picture: Plane, chart: Plane) -> TextureResponse:
-    """Compare a picture with the chart that it shows, both in reflectances: sum of conj(T) P over sum of |T|^2.
+    """Compare a picture P with the chart T that it shows, both in reflectances: sum of conj(T) P over sum of |T|^2.
 
-    Noise has no part in it on average, nor has light of frequencies beyond Nyquist, for neither knows the chart T. The
-    chart is known at the middles of its squares: a sum over a pixel's squares, over the transfer of one square, is
-    that of the pixel's aperture.
+    Noise is independent of the chart, and so is detail beyond Nyquist that folds back; on average neither changes the
+    result. The chart consists of small squares and is known at their middles: the sum over a pixel's squares, over the
+    transfer of one square, is the transfer of the pixel's aperture.
     """
     side = picture.shape[0]
     samples = chart.shape[0] // side
@@ -35,7 +35,7 @@ def texture_response(picture: Plane, chart: Plane) -> TextureResponse:
 
 
 def expected_response(transfer: Floats) -> TextureResponse:
-    """Return the response to a transfer at the frequencies of a picture's Fourier transform, shape (side, side)."""
+    """Return the response of a camera with this transfer, (side, side), at a Fourier transform's frequencies."""
     frequency = np.fft.fftfreq(transfer.shape[0])
     steep = (
         np.maximum(np.hypot(frequency[:, None], frequency), 1 / transfer.shape[0]) ** -3.0
@@ -44,7 +44,10 @@ def expected_response(transfer: Floats) -> TextureResponse:
 
 
 def _spectrum(values: Plane, side: int) -> np.ndarray[tuple[int, ...], np.dtype[np.complex128]]:
-    """Transform under a Hann window, at the lowest `side` frequencies of either axis, from the picture's corner on."""
+    """Return the Fourier transform under a Hann window at the lowest `side` frequencies of either axis.
+
+    Phases count from the picture's corner, so that transforms of pictures with other pixels can be compared.
+    """
     count = values.shape[0]
     window = np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2
     orders = np.rint(np.fft.fftfreq(side) * side).astype(int)

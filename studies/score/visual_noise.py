@@ -1,8 +1,8 @@
-"""Visual noise: how the eye sees an even field's noise, in closed form beside simulated frames.
+"""Visual noise: how strongly the eye sees an even field's noise, by formula and on simulated frames.
 
-Like ISO 15739:2013, annex B: the picture's XYZ is blurred as the eye does in opponent planes, and the standard
+As in ISO 15739:2013, annex B, the picture's XYZ is blurred in opponent planes as by the eye, and the standard
 deviations of CIELUV are added, V = s(L*) + 0.852 s(u*) + 0.323 s(v*). The blur is that of S-CIELAB, on which the
-standard's is based; its own table of sensitivities, and the CIELAB form of 2023, were not at hand.
+standard's blur is based. The standard's own table of sensitivities, and its CIELAB form of 2023, were not at hand.
 """
 
 from collections.abc import Sequence
@@ -27,8 +27,8 @@ from studies.score.figure import Definition, Merit, not_measured
 from studies.score.sharpness import every_pixel
 
 WEIGHTS = np.array([1.0, 0.852, 0.323])  # weights of L*, u* and v*
-WHITE_SHARE = 0.7  # share of the full well of a white, in the channel that fills first
-COLUMNS = ("column gains", "column offsets")  # shared by all pixels of a column
+WHITE_SHARE = 0.7  # share of the full well that a perfect white fills, in the channel that fills first
+COLUMNS = ("column gains", "column offsets")  # noise that all pixels of a column share
 STANDARD = "like ISO 15739:2013, annex B: s(L*) + 0.852 s(u*) + 0.323 s(v*)"
 STEP = 1e-6  # step of XYZ by which the slopes of CIELUV are found
 
@@ -40,7 +40,7 @@ def visual_noise(linear: NDArray[np.float64]) -> float:
 
 
 def raw_visual_noise(sensor: SensorConfig, light: str, exposure_s: float) -> Definition:
-    """Define the visual noise of a camera whose pixels have all three colours, developed by its matrix alone."""
+    """Define the visual noise of a camera with all three colours at every pixel, developed by its matrix alone."""
     names = sensor.channels[:3]
     merit = Merit(
         "iso_15739.visual_noise",
@@ -65,12 +65,12 @@ def raw_visual_noise(sensor: SensorConfig, light: str, exposure_s: float) -> Def
 
 
 def colour_fields(sensor: SensorConfig, light: str, exposure_s: float) -> tuple[list[EvenField], Floats]:
-    """Return even fields of the three channels, each at every pixel, and the matrix that takes them to sRGB.
+    """Return even fields of the three channels, each with its filter at every pixel, and their matrix to sRGB.
 
     Raises
     ------
     InputError
-        For channels that the light doesn't reach, or that are alike.
+        For a channel that gets no light, or channels that are alike.
     """
     known = named_light(light, sensor.window_nm)
     matrix = calibrate(sensor, known.lamp).to_srgb
@@ -78,7 +78,7 @@ def colour_fields(sensor: SensorConfig, light: str, exposure_s: float) -> tuple[
 
 
 def measured_noise(fields: Sequence[EvenField], matrix: Floats, white_cd_m2: float, rng: np.random.Generator) -> float:
-    """Measure the visual noise of 18 % grey on frames of the channels; the luminance is shown as white."""
+    """Measure the visual noise of 18 % grey on frames of the channels; `white_cd_m2` is shown as white."""
     planes = []
     for field in fields:
         raw = field.shoot(GREY * white_cd_m2, field.draw_chip(rng), rng)
@@ -87,14 +87,14 @@ def measured_noise(fields: Sequence[EvenField], matrix: Floats, white_cd_m2: flo
 
 
 def expected_noise(fields: Sequence[EvenField], matrix: Floats, white_cd_m2: float) -> float:
-    """Compute the same in closed form, of noise that is small beside the grey."""
+    """Compute the result of `measured_noise` by a formula, which holds for noise that is small beside the grey."""
     whites_e = [white_cd_m2 * field.electrons_per_cd_m2 for field in fields]
     by_channel = [_variances(field, GREY * e) / e**2 for field, e in zip(fields, whites_e, strict=True)]
     return _expected(np.array(by_channel), matrix, SIDE_PX // fields[0].sensor.sites)
 
 
 def _variances(field: EvenField, electrons: float) -> Floats:
-    """Return the variances that each pixel has by itself, that a column's pixels share, and that a row's do [e-^2]."""
+    """Return three variances [e-^2]: of noise that is each pixel's own, that a column shares, and that a row shares."""
     light_e = np.array([electrons])
     readings = field.readings
     if several(readings):
@@ -102,16 +102,17 @@ def _variances(field: EvenField, electrons: float) -> Floats:
     else:
         by_source = {name: float(law.variance(light_e)[0]) for name, law in readings[0].sources.items()}
     columns = sum(by_source[name] for name in COLUMNS)
-    pixel = readings[0].sensor.pixel  # merged readings are assumed to have its share of row noise
+    pixel = readings[0].sensor.pixel  # merged readings are assumed to have this reading's share of row noise
     rows = by_source["read noise"] * (pixel.row_noise_e / pixel.read_noise_e) ** 2 if pixel.row_noise_e else 0.0
     return np.array([sum(by_source.values()) - columns - rows, columns, rows])
 
 
 def _expected(variances: Floats, matrix: Floats, side: int) -> float:
-    """Return the visual noise of relative variances of the channels, (channel, 3): of pixels, columns and rows.
+    """Return the visual noise for relative variances (channel, 3) of noise per pixel, per column and per row.
 
-    In cosine space, where the eye's blur is a product, noise is the same at all frequencies, that of columns at those
-    that don't change down a column, that of rows at those that don't change along a row.
+    The eye's blur is a product in the space of the cosine transform. There, noise per pixel is the same at all
+    frequencies; noise per column lies at frequencies that don't change down a column, and noise per row at those that
+    don't change along a row.
     """
     cycles = np.arange(side) / (2 * side) * PIXELS_PER_DEGREE
     passed = np.stack([eye_transfer(plane, np.hypot(cycles[:, None], cycles)) for plane in range(3)], axis=-1)
