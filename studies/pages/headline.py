@@ -1,4 +1,4 @@
-"""The page's answer in words: who is better in which light, by how much, and how much light that is worth."""
+"""The answer of a sweep's report in words: who is better in which light, by how much, and how much light that saves."""
 
 import json
 from collections.abc import Sequence
@@ -14,15 +14,15 @@ from studies.pages.report_text import NBSP, camera_name, duration_text, fixed, l
 from studies.pages.verdict import AHEAD, BEHIND, LEVEL, UNKNOWN, Figures, Leads, leads, light_ratio
 from studies.study.study import GRAY_WORLD
 
-CLEARLY = 2.0  # factor on what a person sees, from which on a lead is clear
+CLEARLY = 2.0  # a lead is clear if it is at least this many times the smallest visible difference
 SAME_TIME = 1.01  # ratio of exposure times below which they count as one
-# The same method on both mosaics, the one with a white pixel first; and the pair that the paper compares.
+# The same method on both mosaics; the mosaic with a white pixel is the first.
 WHITE_PIXEL = ("ple_rgbw", "ple_bayer")
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two things that are compared in one place, over light.
+    """Two cameras (or two values of another axis) that are compared under the same conditions, over light.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Pair:
     ours, theirs : Figures
         Figures of the first and of the second.
     levels : sequence of str
-        Names of the light levels, in the study's order; one alone stands for no light axis.
+        Names of the light levels, in the study's order; a study without an axis of light has one.
     light_cd_m2 : sequence of float or None
     """
 
@@ -86,7 +86,7 @@ def _word(outcomes: dict[str, tuple[str, float]]) -> tuple[str, tuple[int, ...],
 
 
 def _seen(run: dict[str, Leads], outcome: str) -> str:
-    """Write what a run of levels has gained or lost, metric by metric."""
+    """Write the leads of a run of levels in those metrics that have a given outcome."""
     here = {metric: run[metric.key].outcome == outcome for metric in HEADLINE}
     return ", ".join(_span(metric, run[metric.key].mean[at]) for metric, at in here.items() if at.any())
 
@@ -115,7 +115,7 @@ def _span(metric: Metric, lead: NDArray[np.float64]) -> str:
 
 
 def _to(metric: Metric, rising: NDArray[np.float64]) -> str:
-    """Write the ends of rising values, and one of them where they are written alike."""
+    """Write the first and the last of rising values, or only one if both are written alike."""
     return " to ".join(dict.fromkeys(lead_text(metric, float(end)) for end in (rising[0], rising[-1])))
 
 
@@ -126,7 +126,7 @@ def _runs(words: Sequence[object]) -> list[tuple[int, int]]:
 
 
 def _where(levels: Sequence[str], first: int, last: int) -> str:
-    """Name a run of levels; the text is empty where there is only one level, or where levels are what is compared."""
+    """Name a run of levels; return an empty text if there is only one level."""
     if len(levels) == 1:
         return ""
     if last == first:
@@ -170,7 +170,7 @@ def in_light(pair: Pair) -> str:
 
 
 _SHARES = {1 / 2: "half", 1 / 3: "a third", 1 / 4: "a quarter"}
-_ROUND = 0.05  # largest relative difference at which a share is named by its word, beside its interval
+_ROUND = 0.05  # a share within this relative difference of a half, a third or a quarter is named by that word
 
 
 # Words on pairs and their conditions
@@ -221,7 +221,7 @@ def best_words(group: Group, cells: Sequence[ReportCell]) -> str:
     group : Group
         A pair of one method on both mosaics; the text is empty for any other pair.
     cells : sequence of ReportCell
-        Those of all cameras under the same conditions. A camera with electrons in R, G and B alone is a Bayer one.
+        Cells of all cameras under the same conditions. A camera with electrons in R, G and B alone is a Bayer camera.
     """
     if not group.ours or (group.ours[0].camera, group.theirs[0].camera) != WHITE_PIXEL:
         return ""
@@ -239,9 +239,10 @@ def best_words(group: Group, cells: Sequence[ReportCell]) -> str:
 
 
 def balance_words(group: Group) -> str:
-    """Say where Gray World misses the light's colour visibly and by more than the lead; empty if it does so nowhere.
+    """Say at which levels Gray World is off by a visible colour difference, and by more than the pair's lead.
 
-    Both are CIEDE2000: the miss is that of the worse of the two cameras, the lead is that of the pictures' medians.
+    Both are CIEDE2000: the error of the balance is that of the worse camera, the lead is the difference of the
+    pictures' medians. The text is empty if there is no such level.
     """
     lead = group.pair.leads[DELTA_E.key].mean
     cases = []

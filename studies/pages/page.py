@@ -1,4 +1,4 @@
-"""Pages from the templates beside this module: everything that is put into them is escaped."""
+"""Write pages from the templates beside this module; every value that is put into them is escaped."""
 
 from base64 import b64encode
 from pathlib import Path
@@ -20,12 +20,12 @@ def svg_address(svg: str) -> str:
 
 
 def own_file(name: str) -> Markup:
-    """Return a style or script of this package, which is never input and goes into a page as it is."""
+    """Return a style or script of this package; it goes into a page unescaped, because users can't change it."""
     return Markup((TEMPLATES / name).read_text(encoding="utf-8"))
 
 
 def write_out(name: str, **values: object) -> str:
-    """Return a template with its values put in, and the style of all pages; a name that has none is an error."""
+    """Return a template filled with values and the style of all pages; a name without a value raises an error."""
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=True,

@@ -1,4 +1,4 @@
-"""Figures that are files, drawn by Matplotlib without its global state: the same bytes each time, on white."""
+"""Draw figures for files by Matplotlib, without its global state: the same bytes each time, on a white ground."""
 
 from collections.abc import Mapping, Sequence
 from io import BytesIO
@@ -49,12 +49,12 @@ def svg_text(figure: Figure) -> str:
 
 
 def png_bytes(figure: Figure) -> bytes:
-    """Write a figure as PNG, two pixels a point."""
+    """Write a figure as PNG, with two pixels per point."""
     return _saved(figure, format="png", dpi=PNG_DPI, metadata={"Software": None})
 
 
 def _saved(figure: Figure, **options: Any) -> bytes:
-    """Lay a figure out once, since each further layout would move its parts a little, and write it."""
+    """Write a figure; it is laid out only once, because each further layout would move its parts a little."""
     buffer = BytesIO()
     with rc_context(STYLE):
         figure.draw_without_rendering()
@@ -70,7 +70,7 @@ def blank(width: float, height: float) -> Figure:
 
 @rc_context(STYLE)
 def picture_rows(rows: Sequence[Sequence[tuple[str, NDArray[np.float64]]]]) -> Figure:
-    """Draw rows of encoded pictures (h, w, 3), each under words no wider than it; all have one width."""
+    """Draw rows of encoded pictures (h, w, 3), all equally wide, each with words above it that are no wider."""
     columns = max(len(row) for row in rows)
     rows = [[("\n".join(wrap(words, TITLE_LETTERS)), picture) for words, picture in row] for row in rows]
     lines = [1 + max(words.count("\n") for words, _ in row) for row in rows]
@@ -96,7 +96,7 @@ def show_picture(axes: Axes, picture: NDArray[np.float64], words: str = "") -> N
 
 
 def plain_ticks(axes: Axes) -> None:
-    """Write the ticks of both axes without exponents; less than two decades have ticks at 1, 2 and 5."""
+    """Write the ticks of both axes without exponents; a logarithmic axis of under two decades has ticks at 1, 2, 5."""
     for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
         if axis.get_scale() == "log" and high < 100 * low:
             axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -105,14 +105,14 @@ def plain_ticks(axes: Axes) -> None:
 
 
 def name_at_ends(axes: Axes, ends: Sequence[tuple[str, float, str]]) -> None:
-    """Write names right of the axes, apart from each other.
+    """Write the names of lines to the right of the axes, without overlap.
 
     Parameters
     ----------
     axes : Axes
         Axes whose scales and limits are set.
     ends : sequence of (name, y, colour)
-        Name, end and colour of each line.
+        Name of each line, its y at the right end, and its colour.
     """
     box = axes.transLimits
     high = CHART[1] * 0.7  # height of the axes, about [points]
@@ -143,13 +143,13 @@ def light_charts(
 
 
 def tick_text(value: float) -> str:
-    """Write a tick without exponent or trailing zeros, thousands apart."""
+    """Write a tick without exponent or trailing zeros, with narrow spaces between thousands."""
     text = f"{value:,.6f}".rstrip("0").rstrip(".").replace(",", "\N{NARROW NO-BREAK SPACE}")
     return text.replace("-", "\N{MINUS SIGN}")
 
 
 def spread(heights: Sequence[float], gap: float, low: float, high: float) -> list[float]:
-    """Move label positions apart until neighbours are `gap` from each other, within `low`..`high` where that fits."""
+    """Move label positions apart until neighbours have the distance `gap`, within `low`..`high` if there is room."""
     order = sorted(range(len(heights)), key=lambda index: heights[index])
     placed = list(heights)
     for before, after in pairwise(order):
@@ -163,19 +163,19 @@ def spread(heights: Sequence[float], gap: float, low: float, high: float) -> lis
 
 
 COLUMNS, WIDTH, HIGHEST = 4, 480.0, 200.0  # panels in a row; total width, and height of the tallest panel [points]
-BAND_NM = 5.0  # lines of lamps are drawn as wide as the published tables' steps
+BAND_NM = 5.0  # width of the bands in which spectra are drawn: the steps of the published tables of lamps
 NM = np.arange(380.0 + BAND_NM / 2, 780.0, BAND_NM)
 # Line styles, which sensors take in turn.
 LINES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)), (0, (1, 3)), (0, (9, 3)), (0, (3, 1)))
 MOST_NAMES = 20  # most names that a plot lists one above the other
 LEAST_CD_M2, MOST_CD_M2, POINTS = 1e-4, 1e5, 181  # from starlight to sunlit snow
-SNR = 10.0  # corresponds to 20 dB
+SNR = 10.0  # SNR that plots mark; it is 20 dB
 
 Curves = Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]  # by channel: wavelength [nm], value
 
 
 def lights_svg(lights: Mapping[str, Spectrum]) -> str:
-    """Draw spectra by name in bands of 5 nm, each over its greatest value."""
+    """Draw spectra by name in bands of 5 nm, each divided by its greatest value."""
     spectra = {name: light.band_average(NM, BAND_NM) for name, light in lights.items()}
     return _svg({name: {"": (NM, values / values.max())} for name, values in spectra.items()})
 
@@ -233,7 +233,7 @@ def snr_svg(sensors: Mapping[str, SensorConfig], light: str, exposure_s: float, 
 
 @rc_context(STYLE)
 def transfer_svg(result: Characterisation, title: str) -> str:
-    """Draw four plots into one SVG document."""
+    """Draw the four plots of a characterisation into one SVG document."""
     transfer, gain = result.transfer, result.gain_dn_per_e
     signal_dn = transfer.mean_dn - result.dark_mean_dn
     signal_e = signal_dn / gain
@@ -268,6 +268,6 @@ def transfer_svg(result: Characterisation, title: str) -> str:
 
 
 def _draw(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
-    """Draw measured points, those that are not finite left out."""
+    """Draw those measured points that are finite."""
     finite = np.isfinite(x) & np.isfinite(y)
     axes.plot(x[finite], y[finite], color=BLUE, marker="o", markersize=4.0, linestyle="")

@@ -1,8 +1,8 @@
-"""The report of a sweep: one self-contained HTML page from values and pictures. Pure: the caller writes it.
+"""Make the report of a sweep: one self-contained HTML page from values and pictures, which the caller writes to a file.
 
-The page's policy refuses every fetch, but of pictures beside it where it leaves some out, and every script but its own,
-whose hash stands in the policy. Values reach the page only through Jinja's escaping (text) and ``tojson`` (the script's
-data block).
+The page's policy allows only its own script, whose hash is part of the policy. It allows no fetch, except of picture
+files beside the page if the page itself leaves some pictures out. Values reach the page only through Jinja's escaping
+(text) and ``tojson`` (the script's data block).
 """
 
 import json
@@ -42,7 +42,7 @@ SEEN_DB = 22.0  # PSNR from which on a picture shows more scene than noise
 
 
 def balance_text(balance: Mapping[str, str]) -> str:
-    """Say which channels Gray World balanced, and which fell back."""
+    """Say which channels Gray World balanced, and which fell back to calibrated gains."""
     fallen = [channel for channel, how in balance.items() if how == "calibrated"]
     if not fallen:
         return ", ".join(sorted(set(balance.values()))) or text.MISSING
@@ -50,7 +50,7 @@ def balance_text(balance: Mapping[str, str]) -> str:
 
 
 def cell_view(cell: ReportCell, level: ReportLevel, group: str) -> dict[str, Any]:
-    """Return what the page says of one picture, as text, and its figures of every seed, as numbers."""
+    """Return what the page says about one picture, as texts, and the picture's figures for every seed, as numbers."""
     row = cell.first
     share = cell.mean("mc_share")
     electrons = json.loads(row.mean_electrons) if row else {}
@@ -78,7 +78,7 @@ def cell_view(cell: ReportCell, level: ReportLevel, group: str) -> dict[str, Any
 
 
 def level_view(level: ReportLevel, cell: ReportCell) -> dict[str, str]:
-    """Return a light level's texts, its light being that of a cell."""
+    """Return the texts about a light level; its light is that of `cell`."""
     luminance = text.significant(cell.luminance_cd_m2, "cd/m²")
     lux = text.significant(cell.illuminance_lux, "lux")
     words = [luminance, f"{lux} on the scene's reference plane"]
@@ -93,7 +93,7 @@ def level_view(level: ReportLevel, cell: ReportCell) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class GroupView:
-    """A group of cells as the page shows it: its title, the place of its first cell and of its truth, its metrics."""
+    """A group of cells as the page shows it: its title, the indices of its first cell and of its truth, its metrics."""
 
     title: str
     first: int
@@ -119,7 +119,7 @@ def group_views(report: ReportData) -> list[GroupView]:
 
 
 def viewer_data(report: ReportData, groups: Sequence[GroupView]) -> dict[str, Any]:
-    """Return what the page's script reads: axes, what is compared at first, and all cells in the order of the axes."""
+    """Return the data of the page's script: axes, the first comparison, and all cells in the order of the axes."""
     of = first_comparison(report)
     per_view = len(report.cells) // len(report.truths)
     levels = []
@@ -142,7 +142,7 @@ def viewer_data(report: ReportData, groups: Sequence[GroupView]) -> dict[str, An
 
 
 def single_group(report: ReportData) -> str:
-    """Describe a study in which nothing competes: its PSNR from the first level to the last."""
+    """Describe a study in which there is nothing to compare: its PSNR at the first and the last level."""
     cells = [cell for cell in report.by_group[0] if isfinite(cell.mean("psnr_db"))]
     ends = [
         f"{text.figure_text(cell, 'psnr_db', 1, 'dB')} at {report.levels[cell.level].name}"
@@ -168,7 +168,7 @@ def reference_name(render: ReportRender) -> str:
 
 
 def known_shares(report: ReportData) -> list[tuple[float, int]]:
-    """Return the Monte Carlo shares that are known, the largest first, each with the place of its cell."""
+    """Return the known Monte Carlo variances over the sensor's own, the largest first, each with its cell's index."""
     shares = [(cell.mean("mc_share"), place) for place, cell in enumerate(report.cells)]
     return sorted((pair for pair in shares if isfinite(pair[0])), key=lambda pair: -pair[0])
 
@@ -181,7 +181,7 @@ def place_name(report: ReportData, groups: Sequence[GroupView], place: int) -> s
 
 
 def render_warning(report: ReportData, groups: Sequence[GroupView]) -> str:
-    """Say where the render's noise exceeds the sensor's most, as every command does; empty if it does so nowhere."""
+    """Say in which cell the render's noise shows most beside the sensor's; return an empty text if it shows in none."""
     shares = known_shares(report)
     over = sum(share >= 1 for share, _ in shares)
     if not over:
@@ -200,9 +200,9 @@ def budget_share(report: ReportData) -> float | None:
 
 
 def speed_rows(report: ReportData) -> list[tuple[str, str, float, float]]:
-    """Return camera and sensor with the mean seconds of capture and of development; first calls don't count.
+    """Return each camera and sensor with the mean seconds of capture and of development; first calls don't count.
 
-    A time is NaN where a picture isn't made, or where there are only first calls.
+    A time is NaN if a picture isn't made yet, or if there were only first calls.
     """
     cells = grid(report)
     rows = []
@@ -234,7 +234,7 @@ def render_report(report: ReportData, pictures: ReportPictures) -> str:
     Returns
     -------
     str
-        HTML that may fetch nothing but the pictures beside it, and these only where it leaves some out.
+        HTML that may fetch nothing, except picture files beside it if it leaves some pictures out.
     """
     # What several parts of the page show.
     groups = group_views(report)

@@ -1,4 +1,4 @@
-"""Which two of a report's pictures are compared; all comparisons' figures and words, for the script and in Markdown."""
+"""Choose which two of a report's pictures are compared, and write the figures and words of all comparisons."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,11 +17,12 @@ from studies.pages.report_data import ReportCell, ReportData
 from studies.pages.verdict import AHEAD, BEHIND, OUTCOMES, Leads, counts, leads
 from studies.study.study import OWN
 
-# Axes by their place in `ReportData.cells`; and in which order an axis is chosen to be compared along, and for rows.
+# Indices of the axes in `ReportData.cells`; and the orders in which an axis is preferred for a row's pictures (along
+# it they are compared) and for the rows.
 SCENE, LIGHT, SENSOR, EXPOSURE, BALANCE, BRIGHTNESS, CAMERA = range(7)
 ALONG_FIRST = (BRIGHTNESS, EXPOSURE, SENSOR, LIGHT, SCENE, BALANCE, CAMERA)
 ROWS_FIRST = (SENSOR, EXPOSURE, SCENE, LIGHT, BALANCE, CAMERA, BRIGHTNESS)
-RIVALS = (CAMERA, SENSOR, EXPOSURE, BALANCE)  # what a person chooses; scenes and lights are the conditions
+RIVALS = (CAMERA, SENSOR, EXPOSURE, BALANCE)  # axes of which a person chooses a value; scene and light are given
 
 
 @dataclass(frozen=True)
@@ -39,9 +40,9 @@ class Comparison:
     Attributes
     ----------
     compared, along, rows : int
-        Axes by their place. `along` may be of one value, and `rows` too: then there is one row.
+        Indices of the axes. `along` and `rows` may have a single value.
     a, b : int
-        Values by their place; equal where nothing competes.
+        Indices of the values; equal if there is nothing to compare.
     """
 
     compared: int
@@ -52,7 +53,7 @@ class Comparison:
 
 
 def axes_of(report: ReportData) -> tuple[Axis, ...]:
-    """Return what varies, in the order of `ReportData.cells`."""
+    """Return all axes of a report, in the order of `ReportData.cells`."""
     return (
         Axis("Scene", tuple(scene.name for scene in report.scenes)),
         Axis("Light", tuple("own light" if x == OWN else f"under {x}" for x in report.spectra)),
@@ -67,8 +68,8 @@ def axes_of(report: ReportData) -> tuple[Axis, ...]:
 def first_comparison(report: ReportData) -> Comparison:
     """Choose the comparison that a page shows at first: of cameras if there are several, else by the next of `RIVALS`.
 
-    Of cameras it takes the pair that the study names, else the same method on both mosaics if the study has both. Where
-    nothing competes, it is the one camera.
+    Of several cameras it compares the pair that the study names, else the same method on both mosaics if the study has
+    both. If there is nothing to compare, both values are the one camera.
     """
     several = [index for index, axis in enumerate(axes_of(report)) if len(axis.values) > 1]
 
@@ -86,7 +87,7 @@ def first_comparison(report: ReportData) -> Comparison:
 
 
 def grid(report: ReportData) -> NDArray[np.object_]:
-    """Return the cells as an array with a dimension for each axis."""
+    """Return the cells as an array with one dimension per axis."""
     cells = np.empty(len(report.cells), dtype=object)
     cells[:] = report.cells
     return cells.reshape([len(axis.values) for axis in axes_of(report)])
@@ -116,8 +117,8 @@ def comparison_words(
 ) -> list[tuple[Group, tuple[str, str, str, str, str]]]:
     """Return the groups of `groups_of`, each with the five sentences that the page says about it.
 
-    They say who is better, what that is worth in light, whether a white balance misses by more, what the two have in
-    common, and how RGBW compares with the best Bayer. A sentence is empty where there is nothing to say.
+    They say which of the two is better, how much light that saves, whether a white balance is off by more than the
+    lead, what the two have in common, and how RGBW compares with the best Bayer camera. A sentence may be empty.
     """
     groups = groups_of(report, axis, a, b)
     places = report.by_group if axis == CAMERA else [()] * len(groups)
@@ -129,9 +130,9 @@ def comparison_words(
 
 
 def means_over_scenes(report: ReportData, groups: Sequence[Group]) -> list[Group]:
-    """Return groups whose figures are means over scenes; scenes that were drawn at random have groups of their own.
+    """Return groups whose figures are means over scenes; they have no cells.
 
-    These groups have no cells.
+    Scenes that were drawn at random are averaged in groups of their own.
     """
     drawn = [scene.name.startswith(DRAWN) for scene in report.scenes]
     rest = len(groups) // len(report.scenes)
@@ -152,12 +153,15 @@ def means_over_scenes(report: ReportData, groups: Sequence[Group]) -> list[Group
 
 
 def _figures(cells: Sequence[ReportCell]) -> dict[str, NDArray[np.float64]]:
-    """Return (level, seed) by metric, NaN where a figure is unknown."""
+    """Return the figures of cells by metric, (level, seed); NaN for an unknown figure."""
     return {metric.key: np.array([cell.samples(metric.key) for cell in cells]) for metric in METRICS}
 
 
 def group_titles(report: ReportData, axis: int) -> list[str]:
-    """Return what varies beside an axis and the light level, for each place of the others, in the groups' order."""
+    """Return a title for each combination of the axes other than `axis` and the light level, in the groups' order.
+
+    A title names the values of those axes that vary.
+    """
     others = [other.values for at, other in enumerate(axes_of(report)) if at not in (axis, BRIGHTNESS)]
     return [
         ", ".join(value for value, values in zip(place, others, strict=True) if len(values) > 1)
@@ -166,16 +170,16 @@ def group_titles(report: ReportData, axis: int) -> list[str]:
 
 
 def comparisons(report: ReportData) -> list[dict[str, Any]]:
-    """Return for each axis what the page's script shows of any two of its values, i and j.
+    """Return for each axis what the page's script shows about any two of its values, i and j.
 
     Returns
     -------
     list of dict
         ``leads``, by "i j" with i < j and by metric: outcomes (their first letters), leads and half widths in all
         places along the other axes. For axes in `RIVALS` also: ``counts``, by "i j" and metric: how often the first is
-        ahead, level and behind over the groups, where levels of the same light count once; ``means``, by "i j": for
-        each mean over scenes its title, and by metric the same as ``leads``, by light; ``answers``, by "a b": the words
-        for each group.
+        ahead, level and behind over the groups, where levels between which no difference is seen count once; ``means``,
+        by "i j": for each mean over scenes its title and, by metric, the same as ``leads`` over light; ``answers``, by
+        "a b": the words for each group.
     """
     cells = grid(report)
     metrics = shown_metrics(report.cells)
@@ -210,7 +214,7 @@ def comparisons(report: ReportData) -> list[dict[str, Any]]:
 
 
 def _flat(lead: Leads) -> list[Any]:
-    """Return outcomes as letters, leads and half widths with seven digits, more than a page writes."""
+    """Return outcomes as letters, and leads and half widths rounded to seven digits; a page shows fewer."""
     numbers = (
         [float(f"{x:.7g}") if np.isfinite(x) else None for x in part.tolist()] for part in (lead.mean, lead.half)
     )
@@ -218,12 +222,12 @@ def _flat(lead: Leads) -> list[Any]:
 
 
 def shown_metrics(cells: Sequence[ReportCell]) -> list[Metric]:
-    """Return the metrics that are known for some cell: those of targets are so on their own scene alone."""
+    """Return the metrics that are known for at least one cell; those of targets are known only on their own scene."""
     return [metric for metric in METRICS if any(isfinite(cell.mean(metric.key)) for cell in cells)]
 
 
 def comparison_markdown(report: ReportData, command: str, a: int) -> str:
-    """Return the page of one value of what the report compares first, beside all the others.
+    """Return a Markdown page that compares one value of the axis that the report compares first with all others.
 
     Parameters
     ----------
@@ -231,7 +235,7 @@ def comparison_markdown(report: ReportData, command: str, a: int) -> str:
     command : str
         Command that makes the page.
     a : int
-        The value, by its place.
+        Index of the value.
     """
     of = first_comparison(report)
     axis = axes_of(report)[of.compared]
@@ -255,7 +259,7 @@ def comparison_markdown(report: ReportData, command: str, a: int) -> str:
 
 
 def lead_table(report: ReportData, axis: int, a: int, metric: Metric) -> str:
-    """Return the leads of one value of an axis over the others: others and places down, light across."""
+    """Return a table of one value's leads over the others: a row per other value and condition, a column per level."""
     names = axes_of(report)[axis].values
     rows = []
     for other in (value for value in range(len(names)) if value != a):
@@ -272,7 +276,7 @@ def lead_table(report: ReportData, axis: int, a: int, metric: Metric) -> str:
 
 
 def lead_cells(metric: Metric, lead: Leads) -> list[str]:
-    """Write leads as cells of a table: a loss that is seen in bold, what isn't seen or isn't decided in brackets."""
+    """Write leads as cells of a table: a visible loss in bold, a lead that is invisible or undecided in brackets."""
     cells = []
     for mean, half, outcome in zip(lead.mean, lead.half, lead.outcome, strict=True):
         words = text.MISSING if isnan(mean) else text.lead_text(metric, float(mean))
@@ -282,5 +286,5 @@ def lead_cells(metric: Metric, lead: Leads) -> list[str]:
 
 
 def code(words: str) -> str:
-    """Write a name as Markdown's code, whatever is in it: in code no sign has a meaning but the backtick and |."""
+    """Write any name as Markdown's code, in which only the backtick and | have a meaning; they are replaced."""
     return "`" + " ".join(words.split()).replace("`", "'").replace("|", "\\|") + "`"

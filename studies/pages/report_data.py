@@ -1,4 +1,4 @@
-"""What a report shows, as values: made from a sweep's rows by `report_sweep`, shown by `report`."""
+"""Values that a report shows: `report_sweep` makes them from a sweep's rows, `report` writes them into a page."""
 
 import json
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ class ReportScene:
 
 @dataclass(frozen=True)
 class ReportLevel:
-    """A light level by name, and where its number comes from."""
+    """A light level by name, and the source of its luminance."""
 
     name: str
     source: str
@@ -69,9 +69,9 @@ class ReportCell:
     luminance_cd_m2, illuminance_lux : float or None
         The level in both units.
     rows : tuple of Row or None
-        One for each seed, in the study's order; None for one that isn't made yet.
+        A row for each seed, in the study's order; None for a row that isn't made yet.
     picture : str or None
-        Name among the page's pictures; None where the page leaves the picture out.
+        Name among the page's pictures; None if the page leaves the picture out.
     """
 
     level: int
@@ -87,7 +87,7 @@ class ReportCell:
         return self.rows[0]
 
     def samples(self, key: str) -> Floats:
-        """Return a row's figure by seed, (seed,); all NaN where one is unknown or not finite."""
+        """Return a figure of every seed's row, (seed,); all are NaN if one is unknown or not finite."""
         if key not in self._known:
             values = np.array([getattr(row, key, None) for row in self.rows], dtype=np.float64)
             self._known[key] = values if np.isfinite(values).all() else np.full_like(values, np.nan)
@@ -99,7 +99,7 @@ class ReportCell:
         return {}
 
     def mean(self, key: str) -> float:
-        """Return the mean of a figure over the seeds; NaN where it is unknown for one of them."""
+        """Return the mean of a figure over the seeds; NaN if it is unknown for one of them."""
         return float(self.samples(key).mean())
 
     def half(self, key: str) -> float:
@@ -108,7 +108,7 @@ class ReportCell:
 
     @property
     def substitution(self) -> float | None:
-        """Return the share of the seeds in which W replaced the luminance; None where one of them doesn't say."""
+        """Return the share of the seeds in which W replaced the luminance; None if it is unknown for one of them."""
         states = [row.substitution for row in self.rows if row and row.substitution is not None]
         return sum(states) / len(states) if len(states) == len(self.rows) else None
 
@@ -122,20 +122,20 @@ class ReportCell:
 
 @dataclass(frozen=True)
 class ReportData:
-    """Content of a report apart from the pictures' bytes.
+    """Content of a report, except the pictures' bytes.
 
     Attributes
     ----------
     rodcone, name, title : str
         Version of rodcone, the study's name, and the report's title.
     compare : tuple of str
-        The two cameras that are compared at first; empty where the study names none.
+        The two cameras that are compared at first; empty if the study names none.
     scenes ... seeds
         Axes of the study.
     cells : tuple of ReportCell
-        One for each scene, spectrum, sensor, exposure, white balance, level and camera, in this order.
+        A cell for each scene, spectrum, sensor, exposure, white balance, level and camera; the last varies fastest.
     truths : tuple of str or None
-        The noise-free picture of each scene under each spectrum; None where it isn't made yet.
+        Name of the noise-free picture of each scene under each spectrum; None if it isn't made yet.
     stages : mapping of str to float
         Seconds by stage.
     environment, configuration : mapping of str to str
@@ -149,7 +149,7 @@ class ReportData:
     looked_at : (int, int)
         Column and row of the first picture that the loupe shows at first.
     denoised : bool
-        Whether the light is.
+        Whether the pictures show denoised light.
     """
 
     rodcone: str

@@ -1,4 +1,4 @@
-"""The pictures of a report: which ones the page holds, in which form, their maps of FLIP, and where to look first."""
+"""The pictures of a report: which ones the page contains, in which format, their FLIP maps, where to look first."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,14 +24,14 @@ LOUPE = (16, 32)  # rows and columns that the loupe shows
 
 @dataclass(frozen=True)
 class ReportPictures:
-    """Pictures and maps of a page, by the names that cells and truths have for them.
+    """Pictures and FLIP maps of a page, by the names in `ReportCell.picture` and `ReportData.truths`.
 
     Attributes
     ----------
     files : mapping of str to bytes
         Lossless WebP.
     flip_maps : mapping of str to bytes
-        LDR-FLIP of each pixel, 255 times, grey: WebP with a loss.
+        LDR-FLIP of each pixel, multiplied by 255, as grey WebP with losses.
     """
 
     files: Mapping[str, bytes]
@@ -52,7 +52,7 @@ def read_pictures(
     true : mapping of str to (h, w, 3) uint8
         The truths; all of them are in the page.
     most : int, optional
-        Pictures beside the truths; left out, as many as `SHOWN_BYTES` hold, and the first two in any case.
+        Most pictures besides the truths; left out, as many as fit into `SHOWN_BYTES`, and at least the first two.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def read_pictures(
 
 
 def view_order(shape: Sequence[int], of: Comparison) -> list[int]:
-    """Return the places of the cells in the order in which a page fills with their pictures.
+    """Return the indices of the cells in the order in which their pictures are put into a page.
 
     First come the two values that are compared, along their whole axis; then the other values of that axis; then the
     other rows.
@@ -114,14 +114,14 @@ def as_webp(values: NDArray[np.uint8], **options: object) -> bytes:
 
 
 def flip_map(picture: NDArray[np.uint8], truth: Seen) -> NDArray[np.uint8]:
-    """Return LDR-FLIP of each pixel (h, w) of a picture (h, w, 3) beside the truth, 255 times and rounded."""
+    """Return LDR-FLIP of each pixel of a picture (h, w, 3) beside the truth, multiplied by 255 and rounded, (h, w)."""
     return np.rint(255 * np.clip(flip(picture / 255.0, truth), 0.0, 1.0)).astype(np.uint8)
 
 
 def busiest(truth: NDArray[np.uint8]) -> tuple[int, int]:
-    """Return the column and row of the middle of that rectangle of the loupe's size where the truth has most edges.
+    """Return the column and row of the middle of that rectangle, as large as the loupe, where the truth has most edges.
 
-    Cameras differ most there: on the chart, if the scene has one.
+    Pictures of cameras differ most there.
     """
     values = truth.astype(np.float64).mean(axis=2)
     edges = sum(np.abs(np.gradient(values, axis=axis)) for axis in (0, 1) if values.shape[axis] > 1)

@@ -1,4 +1,4 @@
-"""The report of a sweep: its rows as the values that `report` shows, renders and engines among them; the pictures."""
+"""Make the values and pictures that `studies.pages.report` shows from the rows and files of a sweep."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -42,17 +42,17 @@ MOST_CELLS = 1000
 def sweep_report(
     folder: Path, most_pictures: int | None = None, where: Mapping[str, str] | None = None, run: LastRun | None = None
 ) -> tuple[ReportData, ReportPictures]:
-    """Return the values and pictures of a sweep, as `studies.pages.report.render_report` takes them.
+    """Return the values and pictures of a sweep for `studies.pages.report.render_report`.
 
     Parameters
     ----------
     folder : Path
         Folder of the sweep.
     most_pictures : int, optional
-        Most pictures beside the truths; left out, as many as a page may hold. The numbers are those of all cells in any
-        case.
+        Most pictures besides the truths; left out, as many as a page may hold. The numbers are always those of all
+        cells.
     where : mapping of str to str, optional
-        Axes, and the one value of each that is shown. Of a study of more than `MOST_CELLS` pictures a part is shown,
+        Axes, and the one value of each that is shown. If more than `MOST_CELLS` pictures remain, only a part is shown,
         and a note says which.
     run : LastRun, optional
         Last run of the folder; left out, it is read.
@@ -60,8 +60,8 @@ def sweep_report(
     Raises
     ------
     InputError
-        For an unknown axis or value, where there is no results database, one of another version, none of the last
-        run's cells is made yet, they were made by different versions, variants or engines, or a picture is gone.
+        For an unknown axis or value, a results database that is missing or has another version, a last run that has
+        made no cell yet, cells made by different versions, variants or engines, or a picture that is gone.
     """
     run = run or last_run(folder)
     rows = run.rows
@@ -111,7 +111,7 @@ def sweep_report(
 
 
 def _cells(study: Mapping[str, Any], row_list: Sequence[Row], scenes: Sequence[str]) -> list[ReportCell]:
-    """Return a cell for each combination that was asked for; one that isn't made yet has no row."""
+    """Return a cell for each combination of the study's axes; a cell that isn't made yet has None for its rows."""
     by_place = {
         (r.scene, r.spectrum, r.sensor, way, r.white_balance, r.level, r.processor, r.seed): r
         for r in row_list
@@ -132,15 +132,15 @@ def _cells(study: Mapping[str, Any], row_list: Sequence[Row], scenes: Sequence[s
 
 
 def shown_part(study: Mapping[str, Any], where: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
-    """Return a study with the values that a page shows of each axis, and a note that says what it leaves out.
+    """Return a study with those values of each axis that a page shows, and a note that says what it leaves out.
 
-    Until at most `MOST_CELLS` pictures are left, the longest axis keeps every other value, its first among them;
-    cameras, which are what a reader compares, count as an axis of a third of their number.
+    As long as more than `MOST_CELLS` pictures are left, every second value of the longest axis is dropped, but not its
+    first. The axis of cameras counts with a third of its length, because a reader compares cameras.
 
     Parameters
     ----------
     study : mapping
-        As the results database notes it, with its exposures, frames and gains together as ``ways``.
+        Study as the results database stores it, with exposures, frames and gains combined as ``ways``.
     where : mapping of str to str
         Axes, and the one value of each that is shown.
     """
@@ -168,8 +168,8 @@ def shown_part(study: Mapping[str, Any], where: Mapping[str, str]) -> tuple[dict
     ]
 
 
-# Parts of a study that a page may show in part, with their names in words; and for each axis of a row its part, and its
-# place in a value of that part.
+# Axes of a study of which a page may show only some values, with their names in words. Then, for each axis of a row,
+# the axis of the study that holds it, and its index if the values of that axis are tuples.
 _SHOWN = {
     "scenes": "scenes",
     "spectra": "lights",

@@ -1,4 +1,4 @@
-"""Numbers and names as text: what the pages write."""
+"""Write numbers and names as the texts that pages show."""
 
 from collections.abc import Sequence
 from math import floor, isfinite, isinf, isnan, log10
@@ -34,7 +34,7 @@ def fixed(value: float | None, digits: int, unit: str = "") -> str:
 
 
 def significant(value: float | None, unit: str = "", digits: int = 3) -> str:
-    """Write `value` with `digits` significant digits, no exponent, thousands apart."""
+    """Write `value` with `digits` significant digits, without exponent, with narrow spaces between thousands."""
     if value is None or not isfinite(value) or value == 0:
         return fixed(value, 0, unit)
     decimals = digits - 1 - floor(log10(abs(value)))
@@ -45,7 +45,7 @@ def significant(value: float | None, unit: str = "", digits: int = 3) -> str:
 
 
 def lead_text(metric: Metric, lead: float) -> str:
-    """Write a lead with its sign, without its unit; one that is written as 0 has no sign."""
+    """Write a lead with its sign and without its unit; a lead that rounds to 0 has no sign."""
     digits = fixed(abs(lead), metric.digits)
     return digits if not float(digits) else ("+" if lead > 0 else "\N{MINUS SIGN}") + digits
 
@@ -69,7 +69,7 @@ def duration_text(seconds: float | None) -> str:
 
 
 def figure_text(cell: ReportCell, key: str, digits: int, unit: str = "") -> str:
-    """Write a cell's figure as "20.1 ± 0.3 dB" where seeds give an interval, else as "20.1 dB"."""
+    """Write a cell's figure as "20.1 ± 0.3 dB" if there are several seeds, else as "20.1 dB"."""
     mean = cell.mean(key)
     half = cell.half(key)
     if isnan(half):
@@ -78,7 +78,7 @@ def figure_text(cell: ReportCell, key: str, digits: int, unit: str = "") -> str:
 
 
 def substitution_text(share: float | None) -> str:
-    """Say for which part of the seeds (or whether, with one) luminance was substituted."""
+    """Say for which share of the seeds (with one seed, whether) W replaced the luminance."""
     if share is None:
         return "not applicable"
     return "on" if share == 1 else f"on for {percent(share)} of the seeds" if share else "off"
@@ -95,13 +95,13 @@ def camera_name(camera: str) -> str:
 
 
 def plain_name(name: str) -> str:
-    """Return a sensor's name without its file's ending, by which a copy of a preset differs from the preset."""
+    """Return a sensor's name without its file's ending, unless the shorter name is that of a preset."""
     plain = name.removesuffix(".toml")
     return name if plain in preset_names() else plain
 
 
 def with_signs(words: str) -> str:
-    """Write the powers in a text of the package's as a page does: um^2 as µm²."""
+    """Write the units and powers in a text of this package as a page does: um^2 as µm²."""
     for plain, sign in (("um^2", "µm²"), ("cos^4", "cos⁴"), ("cd/m^2", "cd/m²"), ("m2", "m²")):
         words = words.replace(plain, sign)
     return words

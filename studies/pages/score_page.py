@@ -11,7 +11,7 @@ from studies.pages.plots import CHART, COLOURS, STYLE, blank, plain_ticks, svg_t
 from studies.score.figure import Merit
 from studies.score.over_light import AtLight
 
-MOST_ON_A_PAGE = 2  # cameras; with more of them each row's conditions stand below it
+MOST_ON_A_PAGE = 2  # for more cameras than this, the conditions of a figure are written below its row
 MOST_VISUAL_NOISE = 10.0  # largest visual noise that is drawn
 PLAIN = 1000.0  # value from which on a figure has no decimals
 
@@ -19,7 +19,7 @@ PLAIN = 1000.0  # value from which on a figure has no decimals
 def score_page(
     scores: Mapping[str, Sequence[Merit]], curves: Mapping[str, Sequence[AtLight]], set_up: str, version: str
 ) -> str:
-    """Write the sheet: a row for each figure, its closed form and its measurement for each camera."""
+    """Write the sheet: a row for each figure, with its computed and its measured value for each camera."""
     rows: dict[str, dict[str, Merit]] = {one.name: {} for found in scores.values() for one in found}
     missing: dict[str, list[str]] = {}
     for camera, found in scores.items():
@@ -46,21 +46,21 @@ def score_page(
 
 
 def number_text(value: float) -> str:
-    """Write a figure to four digits, large ones without an exponent; a dash for one that isn't there."""
+    """Write a figure with four digits, or as a whole number if it is large; write a dash if it isn't finite."""
     if not isfinite(value):
         return "—"
     return f"{value:.4g}" if abs(value) < PLAIN else f"{value:.0f}"
 
 
 def half_text(merit: Merit) -> str:
-    """Write half of an interval's width to two digits, without an exponent where it is large."""
+    """Write half of an interval's width with two digits, or as a whole number if it is large."""
     half = (merit.high - merit.low) / 2
     return f"{half:.2g}" if half < 100 else f"{half:.0f}"
 
 
 @rc_context(STYLE)
 def curves_svg(curves: Mapping[str, Sequence[AtLight]]) -> str:
-    """Draw ratio, accuracy and visual noise over light: lines are closed forms, dots are simulated frames."""
+    """Draw SNR, accuracy and visual noise over light: lines are computed, dots are measured on simulated frames."""
     figure = blank(3 * CHART[0], CHART[1])
     left, middle, right = figure.subplots(1, 3)
     for (camera, rows), colour in zip(curves.items(), COLOURS, strict=False):

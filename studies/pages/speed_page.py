@@ -1,4 +1,4 @@
-"""Speed against error as one self-contained page: a chart and a table for each stage. It has no script."""
+"""A self-contained page on speed and error: a chart and a table for each stage of a bench. It has no script."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,11 +10,11 @@ from studies.pages import report_text as text
 from studies.pages.page import svg_address, write_out
 from studies.pages.plots import BLUE, CHART, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks, svg_text
 
-LEAST_SHARE = 1e-5  # smallest share that is written as a figure
+LEAST_SHARE = 1e-5  # smallest share of the noise variance that is written as a number
 
 
 def bench_page(results: Mapping[str, Any]) -> str:
-    """Return the HTML of a bench's results as `rodcone bench --json` prints them."""
+    """Return a page about a bench's results, which are as `rodcone bench --json` prints them."""
     charts = [(stage, svg_address(svg_text(plane(stage)))) for stage in results["stages"]]
     return write_out("bench.html.j2", results=results, stages=charts, text=text, least=LEAST_SHARE)
 

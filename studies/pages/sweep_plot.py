@@ -1,4 +1,4 @@
-"""A metric of a sweep over light as a figure: its means, and the lead of the first line over each other one."""
+"""Draw a metric of a sweep over light: the means of each line, and the lead of the first line over the others."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,12 +26,12 @@ _NAMES = {"processor": camera_name, "sensor": plain_name}
 
 @dataclass(frozen=True)
 class Panel:
-    """Figures of one place of a study.
+    """Figures under one combination of a study's other axes, drawn as one panel of lines over light.
 
     Attributes
     ----------
     title : str
-        Values of the axes that the sweep varies beside light, the lines' axis and the seeds.
+        Values of the axes that the sweep varies, except light, the axis of the lines and the seeds.
     light : (level,) float64
         Light of the levels, in `unit`.
     unit : str
@@ -129,7 +129,7 @@ def metric_figure(parts: Sequence[Panel], metric: Metric) -> Figure:
 
 
 def _draw(axes: Axes, part: Panel, lines: Mapping[str, tuple[Floats, Floats]], slot: int) -> None:
-    """Draw means with their intervals over light; `slot` is the first line's among the colours."""
+    """Draw means with their intervals over light; `slot` is the index of the first line's colour."""
     ends = []
     for index, (name, (mean, half)) in enumerate(lines.items(), slot):
         colour = COLOURS[index % len(COLOURS)]

@@ -1,4 +1,4 @@
-"""A page that sets a camera's frames beside those of its twin."""
+"""A page that shows a camera's frames beside those of its twin."""
 
 from collections.abc import Sequence
 
@@ -34,7 +34,7 @@ def twin_page(twin: Twin, title: str, version: str) -> str:
 
 @rc_context(STYLE)
 def twin_svg(twin: Twin) -> str:
-    """Draw both photon transfers, and the ratio of the temporal noises."""
+    """Draw the photon transfer of camera and twin, and the ratio of their temporal noise."""
     figure = blank(2 * CHART[0], CHART[1])
     left, right = figure.subplots(1, 2)
     left.loglog(twin.signal_dn, twin.camera_dn2, color=BLUE, marker="o", markersize=3, linestyle="", label="camera")

@@ -1,4 +1,4 @@
-"""Who is ahead, decided here for all pages: by a lead's interval over seeds, and by whether a person sees the lead."""
+"""Decide which of two pictures is ahead, by a lead's interval over seeds and by whether a person sees the lead."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,12 +23,13 @@ class Leads:
     Attributes
     ----------
     mean : array
-        Over seeds of each seed's difference, positive where the first is better.
+        Mean lead over the seeds; it is positive if the first picture is better.
     half : array
-        Half the width of its 95 % interval (Student's t); NaN for one seed.
+        Half the width of the mean's 95 % interval (Student's t); NaN for one seed.
     outcome : array of str
-        `AHEAD` or `BEHIND`: the interval is clear of 0, the lead as large as a person sees. `LEVEL`: it is smaller
-        than that, by its interval or, clear of 0, in the mean. `UNKNOWN`: the seeds can't tell, or there is one.
+        `AHEAD` or `BEHIND`: the interval doesn't contain 0, and a person sees the mean lead. `LEVEL`: a person sees no
+        lead within the interval, or the interval doesn't contain 0 and a person doesn't see the mean lead. `UNKNOWN`:
+        none of these, or there is only one seed.
     """
 
     mean: Floats
@@ -37,7 +38,7 @@ class Leads:
 
 
 def leads(metric: Metric, ours: Floats, theirs: Floats) -> Leads:
-    """Compare the figures (..., seed) of two pictures; where one seed's figure is NaN, the outcome is unknown."""
+    """Compare the figures (..., seed) of two pictures; if one seed's figure is NaN, the outcome is unknown."""
     difference = (1.0 if metric.higher else -1.0) * (ours - theirs)
     mean = difference.mean(axis=-1)
     half = half_width(difference)
@@ -52,7 +53,7 @@ def leads(metric: Metric, ours: Floats, theirs: Floats) -> Leads:
 def same_light(ours: Figures, theirs: Figures) -> list[list[int]]:
     """Group neighbouring light levels into runs within which a person sees no change in either side's picture.
 
-    Each level is compared with the first of its run, by the metrics `DECIDING`.
+    Each level is compared with the first one of its run, by the metrics in `DECIDING`.
     """
     runs: list[list[int]] = []
     sides = [side[metric.key].mean(axis=-1) / metric.threshold for metric in DECIDING for side in (ours, theirs)]
@@ -67,7 +68,7 @@ def same_light(ours: Figures, theirs: Figures) -> list[list[int]]:
 
 
 def counts(ours: Figures, theirs: Figures) -> dict[str, dict[str, int]]:
-    """Count light levels by metric and outcome; a run of levels of `same_light` counts once, by its mean figures."""
+    """Count light levels by metric and outcome; a run of levels from `same_light` counts once, by its mean figures."""
     runs = same_light(ours, theirs)
     counted = {}
     for metric in METRICS:
@@ -83,21 +84,20 @@ def light_ratio(light_cd_m2: Sequence[float], better: Floats, worse: Floats) -> 
     Parameters
     ----------
     light_cd_m2 : sequence of float
-        The levels, rising.
+        Luminance of the levels, rising.
     better, worse : (level, seed) float64
         PSNR [dB].
 
     Returns
     -------
     (level, 3) float64
-        The factor and the ends of its 95 % interval over seeds. NaN for one seed, where some seed's PSNR is reached at
-        no level of the sweep, and where light no longer improves the picture: there `worse` gains less than is seen
-        from one level to the next.
+        The factor and the ends of its 95 % interval over seeds. They are NaN for one seed, if some seed's PSNR is
+        reached at no level of the sweep, and at levels where more light no longer improves `worse` visibly.
 
     Notes
     -----
-    Between two levels PSNR is linear in the logarithm of the light. Of several places the one nearest to the level
-    counts. The interval is Student's, of the logarithms.
+    PSNR is interpolated linearly in the logarithm of the light. If a PSNR is reached at several places, the nearest to
+    the level counts. The interval is Student's, for the logarithms.
     """
     x = np.log(np.asarray(light_cd_m2, dtype=np.float64))
     rises = np.diff(worse.mean(axis=1)) >= PSNR.threshold
@@ -115,7 +115,7 @@ def light_ratio(light_cd_m2: Sequence[float], better: Floats, worse: Floats) -> 
 def _offset(x: Floats, curve: Floats, target: float, level: int, rises: NDArray[np.bool_]) -> float:
     """Return the distance in log light from a level to the nearest place where a curve has the value `target`.
 
-    It is NaN where the curve has that value nowhere.
+    It is NaN if the curve never has that value.
     """
     places = [
         x[i] + (target - curve[i]) / (curve[i + 1] - curve[i]) * (x[i + 1] - x[i])

@@ -136,8 +136,8 @@ def grey_radiance(reflectance: Floats, bands: Light) -> SpectralRadiance:
 def edge_coverage(side: int) -> Floats:
     """Return the share of each of side x side squares that lies right of an edge through the middle.
 
-    A square's shadow across the edge is the sum of two even spreads, |cos| and |sin| wide, so that the share is the
-    integral of a trapezoid:
+    The distances of a square's points from the edge are sums of two uniform variables, a = |cos| and b = |sin| wide.
+    With d the distance of its middle, the share is therefore the integral of a trapezoid:
 
         F(d) = sum of +-max(d +- (a +- b) / 2, 0)^2 / (2 a b).
     """
