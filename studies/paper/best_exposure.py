@@ -1,6 +1,6 @@
-"""Figure B, camera shake: the best exposure time by hand at each level, and what of W's light makes pictures sharp.
+"""Figure B, camera shake: the best exposure time of a hand-held camera at each level, and how W's light shortens it.
 
-A longer time brings light and blur; W brings light without blur. A camera's best time is where they balance.
+A longer time brings more light but also blur; W brings light without blur. The best time is where the two balance.
 """
 
 from collections.abc import Mapping
@@ -38,13 +38,13 @@ READING, BAYER = "table1_output", "bayer"
 
 @dataclass(frozen=True)
 class Best:
-    """Best exposure of a camera at one level, by exposure of its own (seed,).
+    """Best exposure of a camera at one level; each seed has its own.
 
     Attributes
     ----------
     time_s, psnr_db : (seed,) float64
     blur_px : float
-        Standard deviation of the image's place at the mean time, along each axis.
+        Standard deviation of the image's position during the mean time, along each axis [pixels].
     """
 
     time_s: Image
@@ -55,8 +55,8 @@ class Best:
 def best_time_s(times_s: NDArray[np.floating], quality: NDArray[np.floating]) -> tuple[float, float]:
     """Return the exposure time [s] of the highest quality, and that quality; `quality` has the shape (time,).
 
-    They are at the top of the parabola over log time through the best time and its two neighbours. If the best time is
-    the first or the last one, it is returned as it is.
+    The result is the top of a parabola over log time through the best of the given times and its two neighbours. If the
+    best is the first or the last one, it is returned as it is.
     """
     index = int(quality.argmax())
     if index in (0, len(times_s) - 1):
@@ -95,7 +95,7 @@ def measure_best(setup: Setup, subject: View, camera: Camera) -> Mapping[float, 
 
 
 def claims_held(bayer: Mapping[float, Best], interleaved: Mapping[float, Best], more_light: float) -> tuple[Claim, ...]:
-    """Judge the claims that W makes times shorter and pictures better by hand, with each camera at its best time.
+    """Judge the claims that W makes hand-held times shorter and pictures better, with each camera at its best time.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def claims_held(bayer: Mapping[float, Best], interleaved: Mapping[float, Best], 
 
 
 def figure_b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
-    """Draw the best exposures by hand of Bayer, the paper's camera and the default, and judge the claims about them."""
+    """Draw the best hand-held exposures of Bayer, the paper's camera and the default; judge the claims about them."""
     subject = close_up(view(setup, "still_life", 1.0))
     best = {name: measure_best(setup, subject, Camera(READING, name, shake="hand")) for name in (BAYER, PAPER, DEFAULT)}
     light = named_light("D65")

@@ -1,4 +1,4 @@
-"""Claims of the paper as checks with numbers, and how their page writes these.
+"""Claims of the paper, each with checks of computed numbers, and the texts for the page that shows them.
 
 A verdict follows from the numbers and is never written by hand.
 """
@@ -23,7 +23,7 @@ T = TypeVar("T")
 Verdict = Literal["reproduced", "reproduced under a condition", "not reproduced"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
-# The paper's "about": a number given to one digit stands for a range of a fifth on either side.
+# The paper's "about": a number that it gives to one digit is right within a fifth of it on either side.
 ABOUT = 0.2
 Values = Mapping[str, float | NDArray[np.float64]]  # by condition
 
@@ -42,10 +42,10 @@ class ClaimCheck:
     unit : str
         Unit in the words of the page, such as ``dB``.
     default : float or None
-        Value of the default camera, `interleaved`, where `value` is that of the paper's method, `interleaved_paper`.
-        It has no part in the verdict.
+        Value of the default camera, `interleaved`, if `value` is that of the paper's method, `interleaved_paper`. It
+        has no part in the verdict.
     margin : float
-        Half of the value's 95 % interval over exposures; 0 where it doesn't scatter.
+        Half of the value's 95 % interval over exposures; 0 for a value without scatter.
     """
 
     condition: str
@@ -58,7 +58,7 @@ class ClaimCheck:
 
     @property
     def holds(self) -> bool:
-        """Return whether the value's whole interval lies in the range; no NaN or infinite value does."""
+        """Return whether the value's whole interval lies in the range; False for NaN or an infinite value."""
         return bool(
             isfinite(self.value) and self.low <= self.value - self.margin and self.value + self.margin <= self.high
         )
@@ -89,8 +89,8 @@ class Claim:
     def verdict(self) -> Verdict:
         """Return the verdict that follows from the checks.
 
-        The claim is reproduced where every check holds, reproduced under a condition where some of them hold, and not
-        reproduced where none does.
+        The claim is reproduced if every check holds, reproduced under a condition if some of them hold, and not
+        reproduced if none does.
         """
         held = sum(check.holds for check in self.checks)
         return VERDICTS[0] if held == len(self.checks) else VERDICTS[1] if held else VERDICTS[2]
@@ -98,18 +98,18 @@ class Claim:
 
 @cache
 def _stated() -> dict[str, dict[str, Any]]:
-    """Read what `claims.toml` states of each claim, by its number, and the captions of the figures."""
+    """Read `claims.toml`: what it states about each claim, by its number, and the captions of the figures."""
     return tomllib.loads(Path(__file__).with_name("claims.toml").read_text("utf-8"))
 
 
 def claim(number: int, checks: Iterable[ClaimCheck], **words: object) -> Claim:
-    """Return a claim of `claims.toml` with checks that state their own ranges; `words` fill the braces of its note."""
+    """Return a claim of `claims.toml` with checks that have ranges already; `words` fill the braces of its note."""
     stated = _stated()[str(number)]
     return Claim(stated["where"], stated["text"], tuple(checks), stated.get("note", "").format(**words))
 
 
 def judge_claim(number: int, values: Values, **words: object) -> Claim:
-    """Return a claim whose values are checked against the range that `claims.toml` states for it."""
+    """Return a claim of `claims.toml`, and check the values against the range that is stated there."""
     stated = _stated()[str(number)]
     (kind,) = _CHECKS.keys() & stated.keys()
     ends = stated[kind] if isinstance(stated[kind], list) else [stated[kind]]
@@ -118,7 +118,7 @@ def judge_claim(number: int, values: Values, **words: object) -> Claim:
 
 
 def within(values: Values, low: float = -inf, high: float = inf, unit: str = "") -> tuple[ClaimCheck, ...]:
-    """Check that each value lies in a range; for values over exposures, shape (seed,), the mean with its interval."""
+    """Check that each value lies in a range; of values over exposures, shape (seed,), the mean and its interval."""
     return tuple(ClaimCheck(name, float(np.mean(x)), low, high, unit, margin=_margin(x)) for name, x in values.items())
 
 
@@ -127,22 +127,22 @@ def _margin(value: float | NDArray[np.float64]) -> float:
 
 
 def about(values: Values, claimed: float, unit: str = "") -> tuple[ClaimCheck, ...]:
-    """Check against a number that the paper gives as "about": a fifth more or less, `ABOUT`."""
+    """Check that each value is within a fifth (`ABOUT`) of a number that the paper gives as "about"."""
     return within(values, claimed * (1 - ABOUT), claimed * (1 + ABOUT), unit)
 
 
 def within_margin(values: Values, claimed: float, margin: float, unit: str = "") -> tuple[ClaimCheck, ...]:
-    """Check against a number within a margin on either side."""
+    """Check that each value differs from a number by at most a margin."""
     return within(values, claimed - margin, claimed + margin, unit)
 
 
 def at_least(values: Values, low: float, unit: str = "") -> tuple[ClaimCheck, ...]:
-    """Check that values are no less."""
+    """Check that each value is at least `low`."""
     return within(values, low, unit=unit)
 
 
 def at_most(values: Values, high: float, unit: str = "") -> tuple[ClaimCheck, ...]:
-    """Check that values are no more."""
+    """Check that each value is at most `high`."""
     return within(values, high=high, unit=unit)
 
 
@@ -152,12 +152,12 @@ _CHECKS: Mapping[str, Callable[..., tuple[ClaimCheck, ...]]] = {
 
 
 def with_default(claims_of: Callable[[T], Sequence[Claim]], by_camera: Mapping[str, T]) -> tuple[Claim, ...]:
-    """Judge the claims on the results of the paper's own method, and add to each check what the default method gave.
+    """Judge the claims by the results of the paper's own method, and add the default method's value to each check.
 
     Parameters
     ----------
     claims_of : callable
-        Judges the claims on the results of one method.
+        Function that judges the claims by the results of one method.
     by_camera : mapping of str to object
         Results by method, for the two of `CAMERAS`.
     """
@@ -175,7 +175,7 @@ def with_default(claims_of: Callable[[T], Sequence[Claim]], by_camera: Mapping[s
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """A figure: the paper's number, its caption, and the drawing."""
+    """A figure: its number in the paper, its caption, and the drawing."""
 
     name: str
     caption: str
@@ -188,7 +188,7 @@ def paper_figure(name: str, drawing: Figure, **values: object) -> PaperFigure:
 
 
 def range_text(check: ClaimCheck) -> str:
-    """Say in words where the claim holds: ``at least 1``, ``9.04 to 10.04``, ``exactly 1``."""
+    """Write the range in which the claim holds: ``at least 1``, ``9.04 to 10.04``, ``exactly 1``."""
     low, high = (text.significant(value, digits=4) for value in (check.low, check.high))
     if not isfinite(check.high):
         return f"at least {low}"
@@ -198,7 +198,7 @@ def range_text(check: ClaimCheck) -> str:
 
 
 def value_text(check: ClaimCheck) -> str:
-    """Write a check's value and unit, with enough digits to differ from a near end of its range."""
+    """Write a check's value and unit, with enough digits to differ from an end of its range if that is near."""
     for digits in range(3, 7):
         shown = text.significant(check.value, digits=digits)
         ends = [text.significant(end, digits=digits) for end in (check.low, check.high) if isfinite(end)]
@@ -209,5 +209,5 @@ def value_text(check: ClaimCheck) -> str:
 
 
 def default_text(check: ClaimCheck) -> str:
-    """Say what the default camera gives, such as ``default: 3.1 dB``; an empty text where it isn't known."""
+    """Write the default camera's value, such as ``default: 3.1 dB``; return an empty text if it isn't known."""
     return "" if check.default is None else f"default: {value_text(replace(check, value=check.default, margin=0.0))}"

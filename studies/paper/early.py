@@ -1,7 +1,7 @@
-"""The designs that the paper argues against (section 2), each by what it gives away or keeps.
+"""Measure the designs that the paper argues against (section 2).
 
-Sato 1983 and Kijima 2007 take W for the luminance, also where it is full; Gindele & Gallagher 2002 fall back on the
-colours there; Yamagami 1994 brings W and the colours to one sensitivity by a neutral density or complementary filters.
+Sato 1983 and Kijima 2007 use W as the luminance, even where W is full. Gindele & Gallagher 2002 use the colours there.
+Yamagami 1994 gives W and the colours one sensitivity, by a neutral density or by complementary filters.
 """
 
 from collections.abc import Mapping
@@ -33,15 +33,15 @@ MATCHED = ("rgbw_nd", "cmyw")  # Yamagami's mosaics
 CMYW, RGBW = "cmyw_yamagami_published", "rgbw_sato_published"  # their colours are compared
 HOW = ("closed form", "read out")
 EXPOSURE_S, FLAT_SIDE = 0.020, 256  # exposure time and side of the even fields
-WHITE_E = 1e4  # electrons of a W pixel that combined colours are compared with
+WHITE_E = 1e4  # electrons of the W pixel with which combined colour samples are compared
 COLOUR_LIGHTS = {"moonlight": MOONLIGHT_CD_M2, "low light": LOW_CD_M2, "25 cd/m²": 25.0}
 
 
 def range_db(sensor: SensorConfig) -> tuple[float, float]:
-    """Return the dynamic range [dB], in closed form and as measured on frames that are read out.
+    """Return the dynamic range [dB], by formula and as measured on frames that are read out.
 
     It is the light that fills the most sensitive colour over the light in which W's SNR is 1. On frames the first is
-    the light in which half of the pixels are full, and the second follows from W's SNR at the closed form's light.
+    the light in which half of the pixels are full, and the second follows from W's SNR in the computed light.
     """
     light = named_light("D65")
     names = sensor.channels
@@ -53,8 +53,8 @@ def range_db(sensor: SensorConfig) -> tuple[float, float]:
     rng = np.random.default_rng(0)
     shape = (FLAT_SIDE, FLAT_SIDE)
     device = draw_device(sensor, shape, rng)
-    # In the dark the SNR is proportional to the light. So the luminance of an SNR of 1 follows from the SNR measured at
-    # the luminance where the closed form has 1.
+    # In the dark the SNR is proportional to the light. So the luminance with an SNR of 1 follows from the SNR that is
+    # measured at the computed luminance.
     dark_e = read_out(np.full(shape, dark_cd_m2 * white), sensor, device, EXPOSURE_S, rng).electrons
     measured_cd_m2 = dark_cd_m2 * float(dark_e.std() / dark_e.mean())
     steps = full_cd_m2 * np.linspace(0.9, 1.1, 21)
@@ -63,7 +63,7 @@ def range_db(sensor: SensorConfig) -> tuple[float, float]:
 
 
 def colour_noise(reading: str, processor: str, luminance_cd_m2: float) -> tuple[float, float]:
-    """Return the colour noise of an even grey field, in closed form and as measured on frames that are read out.
+    """Return the colour noise of an even grey field, by formula and as measured on frames that are read out.
 
     It is the standard deviation of linear sRGB after its luminance is subtracted. The grey has the value 1.
     """
@@ -85,7 +85,7 @@ def colour_noise(reading: str, processor: str, luminance_cd_m2: float) -> tuple[
 
 
 def ranges_lost_db(reading: str) -> Mapping[str, float]:
-    """Return the dynamic range of RGBW less that of each mosaic of `MATCHED` [dB], in closed form and as read out."""
+    """Return the dynamic range of RGBW less that of each mosaic in `MATCHED` [dB], by formula and as read out."""
     whole = range_db(table1_sensor(reading))
     return {
         f"{reading}, {mosaic}, {how}": ours - theirs
@@ -95,7 +95,7 @@ def ranges_lost_db(reading: str) -> Mapping[str, float]:
 
 
 def colour_noise_ratios(reading: str) -> Mapping[str, float]:
-    """Return the colour noise of C, M, Y over that of R, G, B, by light, in closed form and as read out."""
+    """Return the colour noise of C, M, Y over that of R, G, B, for each light, by formula and as read out."""
     ratios = dict[str, float]()
     for name, level in COLOUR_LIGHTS.items():
         theirs, ours = (colour_noise(reading, design, level) for design in (CMYW, RGBW))
@@ -104,9 +104,9 @@ def colour_noise_ratios(reading: str) -> Mapping[str, float]:
 
 
 def gathered(tile: Tile) -> Mapping[str, tuple[float, float]]:
-    """Return the light of Kijima's combined colour sample over that of a W pixel, by colour.
+    """Return for each colour the light of Kijima's combined sample over that of a W pixel.
 
-    The first number is the closed form, the second is derived from shot noise in frames that are read out.
+    The first number is computed, the second is derived from shot noise in frames that are read out.
     """
     per_cd_m2 = channel_e(table1_sensor("table1_output"), named_light("D65"), 1.0, 1.0)
     weights = np.outer(tent(MATCHED_RADIUS), tent(MATCHED_RADIUS))
@@ -133,8 +133,8 @@ def claims_early(
     Parameters
     ----------
     bright : mapping
-        Correlation of luminance with the truth's where W is full and no colour is, at Figure 5's light, by design and
-        reading.
+        By design and reading, the correlation of the luminance with the truth's where W is full and no colour is, in
+        Figure 5's light.
     lost_db, noise_ratios : mapping
         `ranges_lost_db` and `colour_noise_ratios` of both readings.
     lights : mapping

@@ -1,4 +1,4 @@
-"""Figure 2: the four curves and the tile, and what W gathers and gains over R, G and B."""
+"""Figure 2: the four response curves and the tile, and W's light and SNR in comparison with R, G and B."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,12 +30,12 @@ LEVELS = np.geomspace(1e-3, 1e2, 51)  # [cd/m^2]; W is full at more
 FILLS = {"R": "#c8504b", "G": "#5a9e58", "B": "#4d72c0", "W": "#f4f4f0"}
 SENSORS = (*READINGS, TODAY)
 
-Ratios = Mapping[str, float]  # W over each colour
+Ratios = Mapping[str, float]  # electrons of W over those of each colour
 
 
 @dataclass(frozen=True)
 class Gain:
-    """W's SNR over a colour's, dark noise's share of the variance of W's pixel, and shot noise's of the colour's."""
+    """W's SNR over a colour's; the share of dark noise in the variance of W's pixel, of shot noise in the colour's."""
 
     ratio: float
     dark: float
@@ -100,14 +100,14 @@ def signal_claims(ratios: Mapping[str, Ratios], least: float) -> tuple[Claim, ..
 
 
 def snr_claims(moon: Gains, bright: Gains, pure: Gains) -> tuple[Claim, ...]:
-    """Judge the claims that W's gain in SNR is the signals' ratio in read noise, and its square root in shot noise.
+    """Judge the claims that W's gain in SNR is the signals' ratio if read noise prevails, its root if shot noise does.
 
     Parameters
     ----------
     moon, bright : mapping
         `snr_gains` in moonlight, and with W nearly full.
     pure : mapping
-        As `bright`, but without fixed pattern.
+        Like `bright`, but without fixed patterns.
     """
     roots = {channel: sqrt(value) for channel, value in signal_ratios("D65").items()}
     return (
@@ -134,7 +134,7 @@ def snr_claims(moon: Gains, bright: Gains, pure: Gains) -> tuple[Claim, ...]:
 
 
 def figure_2() -> tuple[PaperFigure, tuple[Claim, ...]]:
-    """Draw curves, tile and W's gain over light, and judge the claims about them."""
+    """Draw the response curves, the tile and W's gain over light, and judge the claims about them."""
     moon = {name: snr_gains(name, MOONLIGHT_CD_M2) for name in READINGS}
     bright = {name: snr_gains(name, bright_cd_m2(name)) for name in READINGS}
     pure = {name: snr_gains(name, bright_cd_m2(name), fixed_pattern=False) for name in SENSORS}

@@ -1,7 +1,7 @@
 """Figure A, the paper's main claim: the camera changes gracefully between light levels, and W's part falls smoothly.
 
-The same scene over 40 levels from starlight to day, exposed for green: W's part in the picture, what it gains over the
-same frame without W, and the largest steps of quality between neighbouring levels.
+The same scene is photographed at 40 levels from starlight to day, exposed for green. The figure shows W's part in the
+picture, the gain over the same frame without W, and the largest steps of quality between neighbouring levels.
 """
 
 from dataclasses import dataclass, replace
@@ -38,9 +38,9 @@ from studies.paper.setup import (
 
 LEVELS_CD_M2 = np.geomspace(1e-4, 1e4, 40)  # mean luminance: from a moonless sky to more than full sun
 READING = "table1_output"
-SMOOTH = 0.5  # largest step of a share between two levels, which are 0.68 octaves apart
+SMOOTH = 0.5  # W's part is smooth if it steps by at most this between levels, which are 0.68 octaves apart
 LEVEL_DB, GAIN_DB = 0.1, 1.0  # a PSNR that counts as no difference, and one that is easily seen
-SEEN_DELTA_E, SEEN_FLIP = 1.0, 0.05  # differences that are just seen; for FLIP a value assumed to be
+SEEN_DELTA_E, SEEN_FLIP = 1.0, 0.05  # differences that can just be seen; that for FLIP is an assumption
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,12 @@ class LevelCurves:
     Attributes
     ----------
     weight, similarity, white_full
-        Substitution's weight, W's share of the similarity (1 - alpha), share of W's pixels that are full.
+        Weight of luminance substitution, W's weight (1 - alpha) in the similarity of pixels, share of W's pixels that
+        are full.
     psnr_db, delta_e, flip
-        Quality: median CIEDE2000, mean FLIP.
+        Quality: PSNR, median CIEDE2000, mean FLIP.
     gain_db
-        PSNR over the same frame without W: W as if it were full, and no substitution.
+        PSNR less that of the same frame without W, in which W is full and nothing is substituted.
     """
 
     weight: Image
@@ -72,7 +73,7 @@ def without_white(raw: RawImage) -> RawImage:
 
 
 def curves(setup: Setup, subject: View, camera: Camera) -> LevelCurves:
-    """Photograph a view (at 1 cd/m^2) at every level."""
+    """Photograph a view, which is given at 1 cd/m^2, at every level; return the curves."""
     unit_s = auto_exposure_s(form_image(subject.radiance, camera.sensor), camera.sensor, LONGEST_S * 1e6)
     rows: list[list[tuple[float, ...]]] = []
     for level in LEVELS_CD_M2:
@@ -106,9 +107,9 @@ def _row(camera: Camera, raw: RawImage, subject: View) -> tuple[float, ...]:
 def largest_step(values: Image, sign: float) -> tuple[float, Image]:
     """Return the largest step from one level to the next: its upper level [cd/m^2], and the step of each seed (seed,).
 
-    Steps are those of `values` (level, seed) times `sign`; a `sign` of 0 stands for steps in either direction. The
-    largest step is that whose confidence interval begins highest, because in the dark means of few exposures rise and
-    fall by chance.
+    `values` have the shape (level, seed). With `sign` 1 steps upwards count, with -1 steps downwards, with 0 both. The
+    largest step is the one whose confidence interval has the highest lower end, because in the dark, means of few
+    exposures rise and fall by chance.
     """
     steps = np.diff(values, axis=0)
     sizes = steps * sign if sign else np.abs(steps)
@@ -118,16 +119,16 @@ def largest_step(values: Image, sign: float) -> tuple[float, Image]:
 
 
 def where_white_fills(curves: LevelCurves) -> float:
-    """Return the level at which half as many of W's pixels are full as at the level with the most [cd/m^2].
+    """Return the first level [cd/m^2] at which at least half as many of W's pixels are full as at any level.
 
-    It is the brightest level where no pixel is ever full.
+    If no pixel is full at any level, return the brightest level.
     """
     full = curves.white_full.mean(axis=1)
     return float(LEVELS_CD_M2[int((full >= full.max() / 2).argmax()) if full.any() else -1])
 
 
 def claims_levels(curves: LevelCurves) -> tuple[Claim, ...]:
-    """Judge the claims about the steps of quality, the steps of W's part, and what W gains."""
+    """Judge the claims about the steps of quality, the steps of W's part, and the gain by W."""
     how = (
         f"still_life, {READING}, {len(LEVELS_CD_M2)} levels from {LEVELS_CD_M2[0]:g} to {LEVELS_CD_M2[-1]:g} cd/m², "
         "exposed for green up to 66 ms."

@@ -1,4 +1,4 @@
-"""The paper's numbers outside its figures: moonlight in photons, 30 dB, eight decades of light, and Table 1."""
+"""The paper's numbers outside its figures: photons of moonlight, 30 dB, eight decades of light, and Table 1."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -23,7 +23,7 @@ FLAT_SIDE = 256  # side of the uniform field that is read out [pixels]
 
 
 def moonlight_photons(first_nm: float, last_nm: float) -> float:
-    """Return the photons of a range of wavelengths that moonlight brings to the sensor through f/5.6 [um^-2 s^-1]."""
+    """Return moonlight's photons in a range of wavelengths that reach the sensor through f/5.6 [um^-2 s^-1]."""
     sensor = replace(table1_sensor("table1_output"), lens=LensConfig(5.6))
     light = named_light("D65")
     inside = (light.wavelength_nm > first_nm) & (light.wavelength_nm < last_nm)
@@ -31,7 +31,7 @@ def moonlight_photons(first_nm: float, last_nm: float) -> float:
 
 
 def measured_snr_db() -> float:
-    """Measure the SNR of a uniform field of 1000 electrons, read out with no noise but that of light [dB].
+    """Measure the SNR of a uniform field of 1000 electrons that is read out with shot noise alone [dB].
 
     The noise is measured on the difference of two frames.
     """
@@ -54,7 +54,8 @@ def photon_claims(per_um2_s: Mapping[str, float], measured_db: float) -> tuple[C
     measured_db : float
         SNR of 1000 electrons as read out.
     """
-    # The spread of n differences has the relative error 1 / sqrt(2 n); 5 of these give a false alarm in 2 million.
+    # The standard deviation of n differences has the relative error 1 / sqrt(2 n). Chance exceeds 5 such errors once in
+    # 2 million.
     margin = decibels(1 + 5 / sqrt(2 * FLAT_SIDE**2)) + 0.01
     under_d65 = {f"D65, {name}": value for name, value in per_um2_s.items()}
     in_pixels = {name: value * 2.0**2 * 0.025 for name, value in under_d65.items()}
@@ -66,7 +67,7 @@ def photon_claims(per_um2_s: Mapping[str, float], measured_db: float) -> tuple[C
 
 
 def range_spans(view: View) -> dict[str, float]:
-    """Return the ratio of bright to dark luminance, day over night, in three senses; `view` is a scene at any level."""
+    """Return three ratios of bright to dark luminance, day over night; `view` is a scene at any level."""
     levels = [level.luminance_cd_m2 for level in DEMO_LEVELS]
     low, high = np.percentile(view.radiance.luminance(), [0.1, 99.9])
     of_scene = float(high / low) if low > 0 else float("inf")
@@ -83,12 +84,12 @@ def range_claim(spans: Mapping[str, float]) -> Claim:
 
 
 def table_claim(swing_wells: Mapping[str, float]) -> Claim:
-    """Judge whether Table 1 agrees with itself, by the voltage swing of each reading [full wells]."""
+    """Judge whether Table 1 is consistent, by the voltage swing under each reading of it, in full wells."""
     return judge_claim(5, swing_wells)
 
 
 def number_claims(view: View) -> tuple[Claim, ...]:
-    """Judge all claims of this module; `view` is the scene whose range counts."""
+    """Judge all claims of this module; `view` is the scene whose range of luminance is used."""
     per_um2_s = {f"{low:g}-{high:g} nm": moonlight_photons(low, high) for low, high in ((400.0, 700.0), VISIBLE_NM)}
     pixels = {name: table1_sensor(name).pixel for name in READINGS}
     swing_wells = {name: pixel.swing_e / pixel.full_well_e for name, pixel in pixels.items()}

@@ -1,4 +1,4 @@
-"""The paper's figures and claims, all of them: computed, written as files, and as one page."""
+"""Compute all figures and claims of the paper, and write them as files and as one page."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -32,7 +32,7 @@ Made = tuple[PaperFigure, tuple[Claim, ...]]
 
 @dataclass(frozen=True)
 class Paper:
-    """The figures in the paper's order, the claims, and what made them."""
+    """The figures in the paper's order, the claims, and facts about the program and settings that made them."""
 
     figures: tuple[PaperFigure, ...]
     claims: tuple[Claim, ...]
@@ -55,7 +55,7 @@ _MAKERS: Mapping[str, Callable[[Setup], Made]] = MappingProxyType(
 
 
 def makers_of(figures: Sequence[str]) -> dict[str, Callable[[Setup], Made]]:
-    """Return the functions that make the figures of these names, in the paper's order; all where none is named.
+    """Return the functions that make the named figures, in the paper's order; without names, those of all figures.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def make(setup: Setup, figures: Sequence[str] = ()) -> Paper:
     ----------
     setup : Setup
     figures : sequence of str
-        Names such as ``6`` or ``1a``; where none is given all are made, and the claims that belong to none of them.
+        Names such as ``6`` or ``1a``. Without names all figures are made, and also the claims that belong to no figure.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def write(paper: Paper, folder: Path) -> Path:
 
 
 def as_json(paper: Paper) -> dict[str, Any]:
-    """Return the facts, the number of claims of each verdict, and the claims with their checks, as values for JSON."""
+    """Return values for JSON: the facts, the number of claims with each verdict, and the claims with their checks."""
     claims = [
         {
             "where": claim.where,
@@ -139,7 +139,7 @@ def as_json(paper: Paper) -> dict[str, Any]:
 
 
 def as_csv(paper: Paper) -> str:
-    """Write the checks as CSV, a row for each one under its claim's number."""
+    """Write the checks as CSV: a row per check, with the number of its claim."""
     head = ("number", "where", "claim", "verdict", "condition", "computed", "claimed", "check", "default")
     rows = []
     for number, claim in enumerate(paper.claims, 1):

@@ -1,8 +1,9 @@
-"""Figure 4 and section 3.1: the patches of eq. (1), by which pixels are alike.
+"""Figure 4 and section 3.1: the patches by which eq. (1) decides how similar two pixels are.
 
-Figure 4: beside an edge, the patch around a pixel x is nearer to that of y on its own side than to that of z. Section
-3.1: with patches of one pixel eq. (1) is the bilateral filter, with larger ones non-local means; both are written down
-here once more, straight from the two filters' own papers, to compare with `isp.interleaved.reconstruction`.
+Figure 4: beside an edge, the patch around a pixel x is more similar to that around y, on the same side, than to that
+around z, on the other side. Section 3.1: with patches of one pixel eq. (1) is the bilateral filter, with larger patches
+it is non-local means. Both filters are written here from their own papers, to compare `isp.interleaved.reconstruction`
+with them.
 """
 
 from collections.abc import Mapping
@@ -29,7 +30,7 @@ from studies.paper.numbers import MOONLIGHT_CD_M2
 from studies.paper.setup import READINGS, Camera, Setup, exposures, table1_sensor, view
 
 PATCH = 5  # our choice, because the paper states none
-ASIDE, AWAY = 4, 8  # pixels from the edge to x, and from x to y and z; even, so that all lie alike in the tile
+ASIDE, AWAY = 4, 8  # pixels from the edge to x, and from x to y and z; even, because the tile has 2x2 pixels
 CROP = 40  # side of the part of the picture that is shown [pixels]
 EXPOSURE_S = 0.020
 LEVELS = {"25 cd/m²": 25.0, "moonlight": MOONLIGHT_CD_M2}
@@ -40,14 +41,14 @@ SIGMA_D, SIGMA_S = 3.0, 60.0  # [pixels], [electrons]
 
 @dataclass(frozen=True)
 class Triplets:
-    """Pixels x beside the edge with their y and z, and the distances of their patches.
+    """Pixels x beside the edge with their pixels y and z, and the distances between their patches.
 
     Attributes
     ----------
     places : (n, 2) intp
-        Row and column of each x; y is `AWAY` rows below, z as many columns to the left, across the edge.
+        Row and column of each x; y is `AWAY` rows below it, and z is as many columns to its left, across the edge.
     to_y, to_z : (n,) float64
-        Euclidean distance of W's patches [standard deviations of a pixel's noise].
+        Euclidean distance between patches of W around x and y, and x and z [standard deviations of a pixel's noise].
     """
 
     places: NDArray[np.intp]
@@ -56,23 +57,23 @@ class Triplets:
 
     @property
     def share(self) -> float:
-        """Return the share of the x that are nearer to their y than to their z."""
+        """Return the share of the pixels x whose patch is nearer to that of y than to that of z."""
         return float((self.to_y < self.to_z).mean())
 
 
 def edge_columns(truth: Image) -> NDArray[np.intp]:
-    """Return the column in each row, shape (h,), at which luminance (h, w) crosses the middle of dark and bright."""
+    """Return for each row of luminance (h, w) the column of the edge, midway between dark and bright; shape (h,)."""
     middle = (truth.min() + truth.max()) / 2
     return np.asarray((truth < middle).sum(axis=1), dtype=np.intp)  # the dark half is on the left
 
 
 def white_plane(raw: RawImage) -> Image:
-    """Fill W's plane h_W in units of noise (h, w), for the distances to have one."""
+    """Return W's plane h_W (h, w), interpolated, in units in which noise has the standard deviation 1 everywhere."""
     return np.asarray(fill(stabilise_raw(raw.electrons, raw), raw.cfa, "W"))
 
 
 def triplets(raw: RawImage, columns: NDArray[np.intp]) -> Triplets:
-    """Compare the patches of h_W around x, y and z beside the edge, in every row that holds all three.
+    """Compare the patches of h_W around x, y and z beside the edge, in every row where all three fit.
 
     Parameters
     ----------
@@ -98,7 +99,7 @@ def triplets(raw: RawImage, columns: NDArray[np.intp]) -> Triplets:
 
 
 def claims_4(shares: Mapping[str, float]) -> tuple[Claim, ...]:
-    """Judge the statement of Figure 4; `shares` of the pixels beside the edge confirm it, by condition."""
+    """Judge the statement of Figure 4; `shares` are those of the pixels beside the edge that confirm it."""
     return (judge_claim(16, shares, patch=PATCH, ms=EXPOSURE_S * 1e3, aside=ASIDE, away=AWAY),)
 
 
@@ -120,7 +121,7 @@ def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
 
 @rc_context(STYLE)
 def _drawing(parts: list[tuple[str, Image, Triplets]]) -> Figure:
-    """Draw for each reading the plane around one x with three boxes, and beside it the boxes' patches enlarged."""
+    """Draw for each reading W's plane around one x with three boxes, and beside it the boxes' patches, enlarged."""
     figure = blank(len(parts) * (SIDE + 150), SIDE + 28)
     for (reading, plane, edge), part in zip(parts, figure.subfigures(1, len(parts), squeeze=False)[0], strict=True):
         axes = part.subplot_mosaic([["plane", name, "."] for name in "xyz"], width_ratios=(10, 3, 5))
@@ -136,17 +137,17 @@ def _drawing(parts: list[tuple[str, Image, Triplets]]) -> Figure:
         words = {"x": "x", "y": f"y, {edge.to_y[middle]:.1f} away", "z": f"z, {edge.to_z[middle]:.1f} away"}
         for name, down, across in (("x", 0, 0), ("y", AWAY, 0), ("z", 0, -AWAY)):
             i, j = row + down - PATCH // 2, column + across - PATCH // 2
-            corner = j - left - 0.5, i - top - 0.5  # because a pixel's middle has whole coordinates
+            corner = j - left - 0.5, i - top - 0.5  # a pixel's middle has whole coordinates
             axes["plane"].add_patch(Rectangle(corner, PATCH, PATCH, fill=False, edgecolor=ORANGE, linewidth=1.6))
             axes["plane"].text(*corner, name, color=ORANGE, weight="bold", va="top")
             show_picture(axes[name], grey[i : i + PATCH, j : j + PATCH])
             distance = axes[name].text(1.1, 0.5, words[name], va="center", transform=axes[name].transAxes)
-            distance.set_in_layout(False)  # because the empty column has room for it
+            distance.set_in_layout(False)  # the empty column has room for it
     return figure
 
 
 def noisy_edge(reading: str) -> RawImage:
-    """Expose a ramp with an edge on a sensor of W alone, where every pixel is a sample, with noise."""
+    """Expose a ramp with an edge on a sensor that has W at every pixel, with noise."""
     sensor = table1_sensor(reading, "mono")
     rng = np.random.default_rng(0)
     field = 500.0 + 60.0 * np.add.outer(np.arange(FRAME_SIDE), np.arange(FRAME_SIDE)) / FRAME_SIDE
@@ -171,7 +172,7 @@ def filtered(values: NDArray[np.float64], patch: int) -> NDArray[np.float64]:
 
 
 def difference(reading: str, patch: int) -> float:
-    """Return the largest relative difference between eq. (1) and the filter over the frame [parts per million]."""
+    """Return the largest relative difference in the frame between eq. (1) and `filtered` [parts per million]."""
     raw = noisy_edge(reading)
     settings = Settings(neighbourhood=2 * REACH + 1, patch=patch, sigma_d=SIGMA_D, sigma_s=SIGMA_S, distance="raw")
     ours = reconstruct(raw, settings)[..., 0]
@@ -180,7 +181,7 @@ def difference(reading: str, patch: int) -> float:
 
 
 def filter_claims(differences: Mapping[int, Mapping[str, float]]) -> tuple[Claim, ...]:
-    """Judge both claims on the limits of eq. (1), by its largest differences from the filter [ppm].
+    """Judge the two claims that eq. (1) contains the two filters, by the largest differences from them [ppm].
 
     The differences are given by patch and by reading of Table 1.
     """
@@ -191,5 +192,5 @@ def filter_claims(differences: Mapping[int, Mapping[str, float]]) -> tuple[Claim
 
 
 def section_3_1() -> tuple[Claim, ...]:
-    """Compute the differences from the filter, and judge both claims by them."""
+    """Compute the differences from both filters, and judge both claims by them."""
     return filter_claims({patch: {name: difference(name, patch) for name in READINGS} for patch in (1, 5)})

@@ -1,6 +1,7 @@
-"""Figure 1: what a small pixel costs in the dark.
+"""Figure 1: how much a small pixel loses in the dark.
 
-(a) a dark half that drowns in noise beside a lit one, (b) pixels of 6 um and of 2 um.
+Part (a) shows a dark half of a scene, which drowns in noise, beside a lit half. Part (b) compares pixels of 6 um with
+pixels of 2 um.
 """
 
 from collections.abc import Mapping
@@ -35,7 +36,7 @@ from studies.paper.setup import (
 from studies.photograph.snr import channel_e, snr
 
 LARGE = "table1_output_6um"  # the larger pixel of Figure 1(b), as in cameras of the time
-DARK_GAIN = LIT_CD_M2 / DARK_CD_M2  # the factor that shows the dark half as bright as the lit one
+DARK_GAIN = LIT_CD_M2 / DARK_CD_M2  # multiplied by this factor, the dark half is as bright as the lit one
 # Figure 1(b).
 LUMINANCE_CD_M2, EXPOSURE_S = 100.0, 0.010
 LARGE_UM, SMALL_UM = 6, 2
@@ -53,7 +54,7 @@ def half_snr_db(subject: View, reading: str, dark: bool) -> float:
 
 
 def claims_1a(dark_db: Mapping[str, float], lit_db: Mapping[str, float]) -> tuple[Claim, ...]:
-    """Judge the paper's claims on Figure 1(a): the dark half shows noise, the lit half none.
+    """Judge the paper's claims about Figure 1(a): the dark half shows noise, the lit half shows none.
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ def claims_1a(dark_db: Mapping[str, float], lit_db: Mapping[str, float]) -> tupl
 
 
 def figure_1a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
-    """Draw the photograph by both readings of Table 1, as taken and with its dark half made as bright as the other."""
+    """Draw the photograph under both readings of Table 1, as taken and with its dark half as bright as the lit one."""
     subject = replace(view(setup, "lit_and_shadowed", None, "lamp"), level=f"{LIT_CD_M2:g}cd/m2")
     rows = []
     half = subject.radiance.shape[1] // 2
@@ -93,7 +94,7 @@ def gain_db(reading: str, *, shot_alone: bool = False) -> float:
         sensor = table1_sensor(reading, "bayer", pitch_um)
         sensor = shot_noise_alone(sensor) if shot_alone else sensor
         electrons = channel_e(sensor, named_light("D65"), LUMINANCE_CD_M2, EXPOSURE_S)
-        # The converter's rounding is noise as well; the closed form leaves it out where shot noise alone is asked for.
+        # The converter's rounding is noise too; with `shot_alone` it is left out, because only the root of e counts.
         values.append(float(np.sqrt(electrons[1]) if shot_alone else snr(electrons, sensor, EXPOSURE_S)[1]))
     return decibels(values[0] / values[1])
 
@@ -118,7 +119,7 @@ def claims_1b(shot_db: float, all_db: Mapping[str, float], psnr_gain_db: Image) 
 
 
 def figure_1b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
-    """Develop the study `paper_1b.toml` by pixels of 6 um and of 2 um, and judge the claims on PSNR and SNR."""
+    """Develop the study `paper_1b.toml` with pixels of 6 um and of 2 um, and judge the claims about PSNR and SNR."""
     subject = view(setup, "still_life", LUMINANCE_CD_M2)
     psnr = {}
     pictures = []

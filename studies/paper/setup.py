@@ -1,4 +1,4 @@
-"""What the figures share: cameras under both readings of Table 1, renders, exposures, pictures, even fields."""
+"""Parts that the figures share: cameras under both readings of Table 1, renders, exposures, pictures, measures."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -38,16 +38,17 @@ from studies.study.study import OWN, Condition, RenderLimits, SceneChoice, Study
 from studies.sweep.cells import device_stream, exposure_stream, shake_stream
 
 RENDERS = "renders"  # folder of the renders, in the command's own folder
-# Readings of Table 1, each with the SNR under which W replaces the luminance (docs/decisions/0005).
+# Readings of Table 1, which can be understood in two ways, each with the SNR below which W replaces the luminance
+# (docs/decisions/0005).
 READINGS: Mapping[str, float] = MappingProxyType(
     {"table1_pixel": SUBSTITUTION_SNR_TABLE1_PIXEL, "table1_output": SUBSTITUTION_SNR}
 )
 TODAY = "low_noise"  # a pixel of today with Table 1's geometry, for comparison
-# The paper's own method, which its claims are tested with, and the default, whose values stand beside them.
+# The paper's own method, by which its claims are tested, and the default, whose values are shown for comparison.
 PAPER, DEFAULT = CAMERAS = ("interleaved_paper", "interleaved")
 RESULT = {PAPER: "result", DEFAULT: "by the default"}  # words above the pictures
-# Scenes that need only a share of the setup's samples: the dark half's own noise hides far more than the render's, and
-# light from a constant environment has little noise.
+# Scenes that need only this share of the setup's samples: noise of the sensor hides that of the render in the dark
+# half, and light from a constant environment has little noise.
 _SPP_SHARE = {"lit_and_shadowed": 0.25, "slanted_edge": 0.25}
 
 
@@ -64,9 +65,9 @@ class Setup:
     spp : int
         Samples per pixel of the renders.
     band_nm : float
-        Width of their bands.
+        Width of the renders' bands.
     seeds : int
-        Exposures of one condition, 2 or more: noise is their scatter.
+        Number of exposures under each condition, 2 or more, because noise is their scatter.
     step : callable
 
     Raises
@@ -88,15 +89,15 @@ class Setup:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Scene that the cameras look at; compared by identity, so that what follows from it is computed once.
+    """Scene that the cameras look at. Views are compared by identity, so that results can be cached per view.
 
     Attributes
     ----------
     scene, level : str
-        As a study names them.
+        Names as in a study.
     radiance : SpectralRadiance
     light : Light
-        The light that the cameras' colours are balanced for.
+        Light to which the cameras' colours are balanced.
     white_cd_m2 : float
         Luminance shown as white.
     """
@@ -117,7 +118,7 @@ class View:
 def table1_sensor(reading: str, mosaic: str = "rgbw", pitch_um: int | None = None) -> SensorConfig:
     """Return Table 1's camera under one reading.
 
-    With `pitch_um` it is the camera that figures vary, with pixels of 2, 3 or 6 um.
+    With `pitch_um`, 2, 3 or 6, it is the camera of those figures that vary the pixel's size.
     """
     sensor = preset(reading)
     if pitch_um is not None:
@@ -153,14 +154,14 @@ class Camera:
 
 
 def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | None = None) -> View:
-    """Return a scene at a mean luminance, or for None with its lights' own powers.
+    """Return a scene at a mean luminance; if that is None, with its lights' own powers.
 
     The scene is rendered once; later calls read that render from the folder.
 
     Parameters
     ----------
     white : str, optional
-        Light group whose colour the cameras are balanced for; left out, the scene's first.
+        Light group to whose colour the cameras are balanced; left out, the scene's first.
     """
     spp = max(1, round(setup.spp * _SPP_SHARE.get(scene, 1.0)))
     study = Study((SceneChoice(scene),), ("1cd/m2",), render=RenderLimits(setup.size, setup.band_nm, spp))
@@ -184,7 +185,7 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
 
 
 def close_up(subject: View) -> View:
-    """Return the middle of a view, a quarter of its pixels, for figures that take hundreds of pictures."""
+    """Return the middle of a view, about a quarter of its pixels, for figures that take hundreds of pictures."""
     rows, columns = (slice((size - side) // 2, (size + side) // 2) for size, side in _sides(subject.radiance.shape))
     return replace(subject, radiance=replace(subject.radiance, values=subject.radiance.values[rows, columns]))
 
@@ -194,7 +195,7 @@ def _sides(shape: tuple[int, int]) -> list[tuple[int, int]]:
 
 
 def at_level(subject: View, luminance_cd_m2: float) -> View:
-    """Return a view that is given at 1 cd/m^2 as it is at another mean luminance."""
+    """Return a view, which is given at 1 cd/m^2, at another mean luminance."""
     radiance = replace(subject.radiance, values=subject.radiance.values * luminance_cd_m2)
     white_cd_m2 = subject.white_cd_m2 * luminance_cd_m2
     return replace(subject, level=f"{luminance_cd_m2:.6g}cd/m2", radiance=radiance, white_cd_m2=white_cd_m2)
@@ -238,7 +239,7 @@ def develop_view(
     Parameters
     ----------
     substitution_snr : float, optional
-        SNR under which W replaces the luminance, for `CAMERAS`; the reading's own of `READINGS` where left out.
+        SNR below which W replaces the luminance, for `CAMERAS`; left out, that of the reading in `READINGS`.
     """
     sensor = camera.sensor
     processor = NAMED[camera.processor]
@@ -271,7 +272,7 @@ def quality_db(pictures: Sequence[Image], truth: Image) -> Image:
 
 
 def photons(light: Light, luminance_cd_m2: float, sensor: SensorConfig) -> float:
-    """Return the photons on the sensor from a uniform field in front of its lens [um^-2 s^-1]."""
+    """Return the photons that reach the sensor from a uniform field in front of its lens [um^-2 s^-1]."""
     spectral = light.spectrum * luminance_cd_m2 * camera_equation(sensor.lens)
     return float((spectral * photons_per_joule(light.wavelength_nm) * light.width_nm).sum() * 1e-12)
 
@@ -287,7 +288,7 @@ def with_even_response(sensor: SensorConfig) -> SensorConfig:
 
 
 def shot_noise_alone(sensor: SensorConfig) -> SensorConfig:
-    """Return the sensor without any noise but that of light, and with a converter too fine to matter."""
+    """Return the sensor with shot noise alone, and with a converter so fine that it doesn't matter."""
     pixel = replace(sensor.pixel, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
     return replace(sensor, pixel=pixel, bits=16)
 

@@ -1,4 +1,7 @@
-"""Figure 6: Bayer and interleaved at 5, 10 and 20 ms, Table 1 at 25 cd/m^2; W replaces the luminance at 5 ms alone."""
+"""Figure 6: Bayer and interleaved with Table 1's sensor at 25 cd/m^2 and 5, 10 and 20 ms.
+
+In the paper W replaces the luminance only at 5 ms.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -38,7 +41,7 @@ class Outcome:
     Attributes
     ----------
     noise : float
-        Share of white.
+        Noise as a share of white.
     psnr_db : (seed,) float64
     substituted : float or None
         Share of the exposures in which W replaced the luminance; None for Bayer.
@@ -60,7 +63,7 @@ class Swap:
 def claims_6(
     bayer: Mapping[str, Outcome], interleaved: Mapping[str, Outcome], swaps: Mapping[str, Swap]
 ) -> tuple[Claim, ...]:
-    """Judge the claims of less noise than Bayer and of substitution at 5 ms alone, and what substitution costs.
+    """Judge the claims of less noise than Bayer's, of substitution only at 5 ms, and of the cost of substitution.
 
     Parameters
     ----------
@@ -88,7 +91,7 @@ def claims_6(
 def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Draw the pictures of the study `paper_6.toml`, and judge the claims about them.
 
-    Each reading has its own threshold of substitution, and what substitution changes is judged too.
+    Each reading has its own threshold of substitution. The changes by substitution are judged too.
     """
     subject = view(setup, "still_life", LUMINANCE_CD_M2)
     outcomes: dict[str, dict[str, Outcome]] = {name: {} for name in ("bayer", *CAMERAS)}

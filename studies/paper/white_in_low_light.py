@@ -1,4 +1,4 @@
-"""Figure 3: in low light one exposure gives a noisy colour image and a cleaner W image, and from both a result."""
+"""Figure 3: one exposure in low light gives a noisy colour image and a cleaner W image; both together give a result."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ LOW_CD_M2, LOW_S = 2.5, 0.020  # low light: a tenth of Table 1's, at Figure 6's 
 
 @dataclass(frozen=True)
 class Stages:
-    """Quality of Figure 3's images: noise as a share of white, and PSNR that the result gains [dB], shape (seed,)."""
+    """Quality of Figure 3's images: noise as a share of white; PSNR that the result gains over the colours [dB]."""
 
     colour_noise: float
     white_noise: float
@@ -45,7 +45,7 @@ class Stages:
 def colour_and_white(raw: RawImage, subject: View, camera: Camera) -> tuple[Image, Image]:
     """Return Figure 3's colour image from R, G and B alone, in linear sRGB, and its W image.
 
-    The colours are balanced by calibration and go through the matrix for no noise.
+    The colours are balanced by calibration, and converted by the colour matrix for no noise.
     """
     planes = bilinear(raw)
     neutral = neutral_electrons(camera.sensor, subject.light, raw.exposure_s)

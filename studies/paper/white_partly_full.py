@@ -1,4 +1,4 @@
-"""Figure 5: at 200 cd/m^2, 66 ms and 3 um W is partly full, and the result is whole."""
+"""Figure 5: at 200 cd/m^2 and 66 ms, with pixels of 3 um, some W pixels are full, and the result has no gaps there."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -38,9 +38,9 @@ class Bright:
     Attributes
     ----------
     white_full, colours_full : float
-        Share of W's pixels that are full, and of the colours'.
+        Share of W's pixels that are full, and share of the colours' pixels that are.
     result_correlation, white_correlation : float
-        Correlation of luminance with the truth where W is full and no colour is: of the result, and of W itself.
+        Correlation with the truth's luminance where W is full and no colour is: of the result's luminance, and of W.
     full_correlation : float
         Correlation of the result where a colour is full as well.
     """
@@ -74,7 +74,7 @@ def measure_bright(raw: RawImage, result: Image, subject: View) -> Bright:
 
 
 def claims_5(bright: Mapping[str, Bright]) -> tuple[Claim, ...]:
-    """Judge the claims that W is partly full and the result whole, by reading."""
+    """Judge the claims that some W pixels are full and the result has no gaps, under each reading."""
     whole = {f"{name}, colours not full": shot.result_correlation for name, shot in bright.items()}
     whole |= {f"{name}, a colour full too": shot.full_correlation for name, shot in bright.items()}
     return (
