@@ -1,4 +1,4 @@
-"""Anyone's developed pictures of a set against its truth: every metric by condition, with intervals over scenes."""
+"""Judge anyone's developed pictures of a data set against its truth, by every metric, with intervals over scenes."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -37,7 +37,7 @@ EXPECTED_UNDER = "D65"
 FROZEN_LIST = "benchmark"
 SENSORS = Path(__file__).parents[1] / "configs" / "sensors"
 ENDINGS = (".png", ".tif", ".tiff", ".npy")
-_OVERSHOOT = 0.01  # by so much values of an array may lie outside 0 to 1
+_OVERSHOOT = 0.01  # values of an array may lie outside 0 to 1 by this much
 # Common mistakes, each with a function that undoes it. Pictures are refused if such a function brings them nearer to
 # the truth by `_NEARER_DB`.
 _MISTAKES: Mapping[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
@@ -79,9 +79,9 @@ class Score:
 
 
 def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Row, list[Score]]:
-    """Score a set's developed pictures, and beside them the pictures of the processors in the set's own sweep.
+    """Score developed pictures of a set, and the pictures of those processors that the set's own sweep has used.
 
-    Also return the set's head, the first line of its manifest.
+    Return the first line of the set's manifest, and the scores.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Ro
     Raises
     ------
     InputError
-        For pictures that are missing, unknown, of another size or in another encoding, and a set that isn't whole.
+        For pictures that are missing, unknown, of another size or in another encoding, and for an incomplete set.
     """
     manifest = read_manifest(out / SET)
     if "rgb" not in manifest[0]["planes"]:
@@ -130,7 +130,10 @@ def _condition(row: Row) -> tuple[str, str]:
 
 
 def expected(samples: Lines, study: str) -> list[Score]:
-    """Compute by `rodcone expect` the PSNR of each condition whose sensor is a preset or a file of the frozen list."""
+    """Compute the expected PSNR (`studies.design.expect`) of each condition whose sensor is a preset or frozen file.
+
+    A frozen file is one of the study `FROZEN_LIST`.
+    """
     known = {name: name for name in preset_names()}
     if study == FROZEN_LIST:  # because the sensor files of other studies may share these names
         known |= {path.name: str(path) for path in SENSORS.glob("*.toml")}
@@ -150,8 +153,8 @@ def expected(samples: Lines, study: str) -> list[Score]:
 def judge_shard(files: Mapping[str, Path], shard: Shard) -> Shard:
     """Measure a shard's pictures: return it with a row of figures in place of each sample's line.
 
-    `files` are the pictures by their samples' keys; samples without one have no row. A row's ``mistakes`` are the PSNRs
-    that the picture would have with each of the usual mistakes undone.
+    `files` are the pictures by their samples' keys; samples without a picture have no row. A row's ``mistakes`` are the
+    PSNRs that the picture would have if each of the common mistakes were undone.
     """
     rows = []
     for arrays, facts in read_shard(shard.path):
@@ -217,9 +220,9 @@ def scores(rows: Sequence[Row], developer: str) -> list[Score]:
 
 
 def scores_of_sweep(rows: Sequence[Row]) -> list[Score]:
-    """Return the scores of each processor from a sweep's cells of one frame.
+    """Return the scores of each processor from those cells of a sweep that have a single frame, not a burst.
 
-    If the sweep has several white balances, each of them is scored by itself.
+    If the sweep has several white balances, each of them is scored separately.
     """
     single = [row for row in rows if row["processor"] in NAMED and row["frames"] == 1]
     several = len({row["white_balance"] for row in single}) > 1
@@ -231,7 +234,7 @@ def scores_of_sweep(rows: Sequence[Row]) -> list[Score]:
 
 
 def _pictures_of(folder: Path, samples: Lines) -> dict[str, Path]:
-    """Find the picture files by the set's keys; a condition has all of its pictures or none."""
+    """Find the picture files by the set's keys; refuse a condition that has only some of its pictures."""
     files: dict[str, Path] = {}
     for path in sorted(path for path in folder.glob("*") if path.suffix.lower() in ENDINGS):
         also = files.setdefault(path.stem, path).name
@@ -264,7 +267,7 @@ def _check_encoding(rows: Sequence[Row]) -> None:
 
 
 def judge_page(head: Mapping[str, Any], scores: Sequence[Score]) -> str:
-    """Write the scores of `judge` as a self-contained page: per camera a chart of PSNR over light, and every metric."""
+    """Return the scores of `judge` as a self-contained page: per camera a chart of PSNR over light, and all metrics."""
     by_camera = {camera: list(lines) for camera, lines in groupby(scores, key=lambda score: score.camera)}
     charts = {camera: svg_address(svg_text(psnr_chart(x))) for camera, x in by_camera.items()}
     return write_out("judge.html.j2", head=head, cameras=by_camera, charts=charts, metrics=MEASURED, text=text)
@@ -272,7 +275,7 @@ def judge_page(head: Mapping[str, Any], scores: Sequence[Score]) -> str:
 
 @rc_context(STYLE)
 def psnr_chart(scores: Sequence[Score]) -> Figure:
-    """Draw each developer's PSNR over luminance with its interval; what is expected is a line without one."""
+    """Draw each developer's PSNR over luminance with its interval; the expected PSNR is a line without an interval."""
     figure = blank(*CHART)
     axes = figure.subplots()
     ends = []

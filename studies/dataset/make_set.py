@@ -43,9 +43,9 @@ _NOISE = (0.01, 0.03, 0.1, 0.3, 1.0)
 def make_set(
     study: Study, out: Path, order: SetOrder, command: str, runner: Runner, step: Step | None = None
 ) -> dict[str, Any]:
-    """Make the shards of a set that are missing, their manifest and card, in the folder ``set`` of a sweep's folder.
+    """Make the missing shards of a set, its manifest and its card, in the folder ``set`` of a sweep's folder.
 
-    After Ctrl-C, a kill or a full disk the next call goes on. The processors of the study stand for their mosaics.
+    After Ctrl-C, a kill or a full disk the next call goes on. The study's processors only say which mosaics there are.
 
     Parameters
     ----------
@@ -54,16 +54,17 @@ def make_set(
         Folder; renders and frames stay in it, where a sweep of the same study finds them.
     order : SetOrder
     command : str
-        Command that makes the set, for manifest and card.
+        Command that makes the set, as manifest and card state it.
     runner : callable
-        Function of shards and ``make`` that yields the results of `studies.dataset.shards.make_shard` as they come.
+        Function that takes shards and ``make``, and yields a result of `studies.dataset.shards.make_shard` when it is
+        ready.
     step : callable, optional
         Function that is called with what is being done and the share that is done.
 
     Returns
     -------
     dict
-        The set's `folder`, its numbers of `samples` and `shards`, and the number of shards that this call `made`.
+        ``folder`` of the set; its numbers of ``samples`` and ``shards``; and ``made``, the shards that this call made.
 
     Raises
     ------
@@ -107,12 +108,12 @@ def _show_render(show: Step, index: int, count: int, share: float, error: float)
 
 
 def _identity(study: Study, scenes: Iterable[OpenedScene], order: SetOrder) -> str:
-    """Return the hash of all that distinguishes a set from another: its scenes, its frames' names, and the order.
+    """Return the hash of all that distinguishes one set from another: its scenes, its frames' names, and the order.
 
     Raises
     ------
     InputError
-        For two frames of one name.
+        For two frames with the same name.
     """
     alike = conditions(replace(study, white_balances=study.white_balances[:1]))  # balances share a frame
     names = [_name(*frame) for frame in product(alike, study_mosaics(study), study.seeds)]
@@ -140,7 +141,7 @@ def _earlier(folder: Path, identity: str) -> Lines:
 def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Facts, order: SetOrder) -> list[Sample]:
     """Return the samples of a scene, one for each frame or part of a frame.
 
-    Cells that differ only in what is done with a frame afterwards share its sample.
+    Cells that differ only in how a frame is developed share its sample.
     """
     frames = {_name(x.condition, processor_of(x.processor).mosaic, x.seed): x for x in reversed(cells)}
     windows = _windows(np.load(cells[0].frame.electrons, mmap_mode="r").shape[:2], order.crop)
@@ -162,7 +163,7 @@ def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Fac
 
 
 def _name(condition: Condition, mosaic: str, seed: int) -> str:
-    """Return the name of a frame, in letters that any reader takes."""
+    """Return the name of a frame, in characters that every reader of WebDataset accepts."""
     parts = (*frame_labels(condition).values(), mosaic, f"s{seed}")
     return "_".join(_NOT_IN_KEYS.sub("-", part.removesuffix(".toml").replace(".", "p")) for part in parts)
 
@@ -222,7 +223,7 @@ def card(lines: Lines) -> str:
 
 
 def _histogram(values: Sequence[float], edges: Sequence[float]) -> dict[str, int]:
-    """Count the values between edges, by the words of the card."""
+    """Count the values between edges; the keys are the ranges in words, for the card."""
     between = (f"{low:g} to {high:g}" for low, high in pairwise(edges))
     names = (f"under {edges[0]:g}", *between, f"{edges[-1]:g} and more")
     counts = np.bincount(np.searchsorted(edges, values, side="right"), minlength=len(names))

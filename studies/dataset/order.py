@@ -1,4 +1,4 @@
-"""What a data set has beside its study: drawn scenes, planes of truth, shards; what it can't hold, and its room."""
+"""Settings of a data set that its study doesn't have; checks of what samples can't hold and of the room on the disk."""
 
 import shutil
 from collections.abc import Iterable
@@ -21,7 +21,9 @@ from studies.study.study import SceneChoice, Study, study_mosaics
 _SCENES = 0, 100_000, "give a number of scenes"
 _BYTES = {"rgb": 12, "xyz": 12, "depth": 4, "normals": 12, "ids": 4, "mosaic_e": 4}  # [bytes per pixel]
 _SAMPLE_BYTES = 20_000  # the heads of a sample's files, and its facts
-RENDERS = 0.9  # share of a set's time, for the progress bar: 97 % for the frozen list, less for few samples per pixel
+# Part of the progress bar for the renders: they take 97 % of the time of the frozen list, less with few samples per
+# pixel.
+RENDERS = 0.9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +65,7 @@ class SetOrder:
 
     @property
     def drawn_scenes(self) -> tuple[SceneChoice, ...]:
-        """Return the scenes that are drawn at random; the seed and a counter decide each one's hash."""
+        """Return the scenes that are drawn at random; each has a hash of the seed and a counter for its name."""
         counts = {"generated": self.generated, "diorama": self.diorama or 0}
         hashes = ((family, digest([self.seed, index])[:12]) for family in counts for index in range(counts[family]))
         return tuple(SceneChoice("-".join(drawn)) for drawn in hashes)
@@ -95,7 +97,7 @@ def check_cameras(study: Study, order: SetOrder) -> None:
 
 
 def bytes_needed(study: Study, plan: Plan, scenes: Iterable[OpenedScene], order: SetOrder) -> float:
-    """Return the most bytes that a set takes together with the renders and frames that it is made from."""
+    """Return the most bytes that a set needs, together with the renders and frames from which it is made."""
     total = 0.0
     conditions = len(study.spectra) * len(study.levels) * len(study.exposures) * len(study.seeds)
     for opened in scenes:
@@ -114,7 +116,7 @@ def bytes_needed(study: Study, plan: Plan, scenes: Iterable[OpenedScene], order:
 
 
 def require_room(needed: float, out: Path) -> None:
-    """Raise `InputError` where the disk has less room than a set needs beyond what is in its folder already."""
+    """Raise `InputError` if a set needs more bytes than its folder's files and the disk's free room have together."""
     held = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
     free = shutil.disk_usage(out).free
     if needed - held > free:

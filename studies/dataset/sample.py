@@ -1,4 +1,4 @@
-"""A sample of a data set: a raw frame, or a part of one, and what is true of it, cut from files of its scene."""
+"""A sample of a data set: a raw frame, or a part of one, with its truth, which is cut from files of its scene."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -36,7 +36,8 @@ from studies.sweep.prepare import PLANES, Job, scene_transport
 from studies.sweep.provenance import deciding_modules, versions
 from studies.sweep.stored import is_whole, keep_array, keep_facts, read_facts
 
-# Planes of truth that a sample may hold beside its raw frame; channel, group and colour are their last axes.
+# Planes of truth that a sample may hold besides its raw frame. Their first axes are row and column; channel, group or
+# colour is the last one.
 TRUTH = {
     "mosaic_e": "expected photo-electrons of the mosaic",
     "channels_e": "expected photo-electrons behind every filter at every pixel, in the order of `channels`",
@@ -55,7 +56,7 @@ Facts = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Sample:
-    """Sample to make, with all that it is made from. It travels to its worker as it is; arrays travel as paths.
+    """Sample to make, with all that it is made from. It is sent to a worker by pickle, with paths in place of arrays.
 
     Attributes
     ----------
@@ -66,16 +67,16 @@ class Sample:
     mosaic : str
         Mosaic as in `sensor.presets.vary`.
     scene_hash : str
-        Hash of the scene's shapes, whatever its light.
+        Hash of the scene's shapes, which doesn't depend on its light.
     split : str
     files : mapping of str to Path
-        Array of the whole frame that each of its `TRUTH` is cut from; electrons are at 1 cd/m^2 and 1 s, XYZ at
-        1 cd/m^2.
+        For each plane of `TRUTH` in the sample, the file of the whole frame from which it is cut. Electrons are those
+        at 1 cd/m^2 and 1 s, XYZ is that at 1 cd/m^2.
     illuminants : mapping of str to any
-        Bands [nm], and by light group its emission in them at 1 cd/m^2 of the scene.
+        Bands [nm], and for each light group its emission in them if the scene has a mean luminance of 1 cd/m^2.
     part : int or None
-        Number among the parts of the frame, each exposed as a frame of its own; None of a whole frame, the sweep's to
-        the bit.
+        Number of the part among those of the frame; each is exposed as a frame of its own. None for a whole frame,
+        which is the same as the sweep's, bit for bit.
     window : (int, int, int, int)
         First row and column of the part, its height and width.
     """
@@ -100,7 +101,7 @@ def make_sample(sample: Sample) -> tuple[Arrays, dict[str, Any]]:
     light = cell.luminance_cd_m2 * cell.exposure_s
     expected_e = np.asarray(_opened(frame.electrons)[place], dtype=np.float64) * light
     sensor = frame.sensor
-    # The whole frame decides the time of a metered channel, for the frame's parts too.
+    # The whole frame decides the exposure time of a metered channel, also for its parts.
     readings = resolve(sensor, np.asarray(_opened(frame.electrons) * light), cell.exposure_s)
     stream = exposure_stream(cell.condition, sample.mosaic, cell.seed)
     if sample.part is not None:
@@ -125,8 +126,8 @@ def _facts(
     cell = sample.cell
     sensor = sample.cell.frame.sensor
     variance_e2, light_e2 = frame_variance(expected_e, readings), light_variance(expected_e, readings)
-    # The square of one draw is a very noisy estimate of a pixel's variance, so it is pooled over 3x3 pixels as a
-    # render's variance is.
+    # The square of one draw is a very noisy estimate of a pixel's variance. It is therefore averaged over 3x3 pixels,
+    # as a render's variance is.
     shares = uniform_filter(errors_e[0] * errors_e[-1] / light_e2, 3)
     mean_e = {name: float(expected_e[mask(sensor.cfa, name, raw.shape)].mean()) for name in sensor.channels}
     by_channel = {name: at_channel(readings, name) for name in mean_e}
@@ -162,7 +163,7 @@ def _facts(
 def frame_labels(condition: Condition) -> dict[str, Any]:
     """Return those names of a condition that decide a single frame: scene, spectrum, level, exposure and sensor.
 
-    The gain is among them where it isn't the sensor's own; the white balance and the number of frames aren't.
+    The gain is included unless it is the sensor's own; the white balance and the number of frames never are.
     """
     left_out = ("white_balance", "frames", *(["gain"] if condition.gain == OWN else []))
     return {name: value for name, value in labels(condition).items() if name not in left_out}
@@ -171,8 +172,8 @@ def frame_labels(condition: Condition) -> dict[str, Any]:
 def noise_coefficients(readings: Sequence[PlainReading], gain_e_per_dn: float) -> dict[str, dict[str, float]]:
     """Return a, b and c of each channel's noise: the variance of a pixel is a x + b + c x^2 [DN^2].
 
-    x is the pixel's mean above black [DN]. The shot noise is a x, and the PRNU c x^2; b is all that doesn't depend on
-    light, except the noise of the dark current, which is left out.
+    x is the pixel's mean above black [DN]. The variance of shot noise is a x, that of PRNU c x^2. b is the variance of
+    all noise that doesn't depend on light, except the noise of the dark current, which is left out.
     """
     result = {}
     for name in readings[0].sensor.channels:
@@ -190,7 +191,7 @@ def _opened(path: Path) -> NDArray[Any]:
 
 
 def scene_facts(job: Job, opened: OpenedScene, cells: Sequence[Cell], progress: Progress) -> Facts:
-    """Return the facts of a scene; make its files anew where one is missing or damaged.
+    """Return the facts of a scene; if one of its files is missing or damaged, make all of them anew.
 
     Parameters
     ----------
@@ -219,12 +220,12 @@ def scene_facts(job: Job, opened: OpenedScene, cells: Sequence[Cell], progress: 
 
 @cache
 def code_digests() -> list[str]:
-    """Return the digests of the modules of `studies` that decide a sample, so that other code makes a set anew."""
+    """Return the digests of the modules of `studies` that decide a sample; if they change, a set is made anew."""
     return [digest_file(path) for path in deciding_modules(names=("studies.dataset.shards",))]
 
 
 def plane_files(job: Job, facts: Facts, cell: Cell, planes: Sequence[str]) -> dict[str, Path]:
-    """Return the files that planes of a cell's frame are cut from; a picture file has no planes about surfaces."""
+    """Return the files from which planes of a cell's frame are cut; a picture file has no planes about surfaces."""
     folder = (job.out / PLANES).resolve()
     paths = {"mosaic_e": cell.frame.electrons, "rgb": cell.frame.truth}
     paths |= {plane: folder / name for plane, name in facts["files"][_frame_key(cell)].items()}
@@ -232,7 +233,7 @@ def plane_files(job: Job, facts: Facts, cell: Cell, planes: Sequence[str]) -> di
 
 
 def scene_hash(opened: OpenedScene) -> str:
-    """Return the hash of a scene's shapes, whatever its light and size; of a picture, that of its files."""
+    """Return a hash of a scene's shapes, which depends on neither light nor size; for a picture, one of its files."""
     if opened.scene is None:
         return digest([digest_file(file) for file in files_of(opened.choice.source)])
     return digest_inputs([opened.scene.geometry, file_digests(opened.scene.geometry)])

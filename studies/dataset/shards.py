@@ -1,4 +1,4 @@
-"""Shards of a data set: plain tar files in WebDataset's layout, the manifest that lists them, and reading both."""
+"""Write and read the shards of a data set, tar files in WebDataset's layout, and the manifest that lists them."""
 
 import json
 import tarfile
@@ -21,7 +21,7 @@ from studies.dataset.sample import Arrays, Sample, code_digests, make_sample
 from studies.sweep.provenance import versions
 
 MANIFEST = "manifest.jsonl"
-# Facts of a sample that its line in the manifest holds too.
+# Facts of a sample that are also in its line of the manifest.
 _LISTED = ("key", "scene", "scene_hash", "spectrum", "level", "luminance_cd_m2", "exposure", "sensor", "mosaic", "tile",
            "snr_db", "saturated", "render_noise")  # fmt: skip
 # Keys that each kind of line of a manifest must have.
@@ -31,14 +31,15 @@ _READ = {
     "shard": ("name", "split", "samples", "bytes", "digest", "made_from"),
     "sample": _LISTED,
 }
-SPLITS = {"train": 0.8, "validation": 0.9, "test": 1.0}  # upper end of each split in a scene's hash, taken as 0 to 1
+# Upper limit of each split for a scene's hash, read as a number from 0 to 1.
+SPLITS = {"train": 0.8, "validation": 0.9, "test": 1.0}
 Lines = list[dict[str, Any]]
 Runner = Callable[..., Generator[Any, None, None]]  # runs tasks by `make`, as `studies.sweep.workers.run` does
 
 
 @dataclass(frozen=True)
 class Shard:
-    """File of samples, which is a task of `studies.sweep.workers`.
+    """File of samples; to make it is a task for `studies.sweep.workers`.
 
     Attributes
     ----------
@@ -46,9 +47,9 @@ class Shard:
         `shard_key` of its samples.
     path : Path
     samples : tuple of Sample
-        Samples from which the shard is made; empty for one that is made already.
+        Samples from which the shard is made; empty for a shard that exists already.
     lines : sequence of dict
-        Lines in the manifest, once the shard is made: its own line, then one per sample.
+        Lines of the manifest for a shard that exists: its own line, then one per sample.
     """
 
     key: str
@@ -69,7 +70,7 @@ def split_of(scene: str) -> str:
 
 
 def into_shards(samples: Sequence[Sample], count: int, folder: Path) -> list[Shard]:
-    """Divide the samples of each split into shards, whose number is in proportion to the split's samples.
+    """Divide the samples of each split into shards; their number is proportional to the split's number of samples.
 
     Samples are sorted by the hash of their keys, which mixes scenes.
     """
@@ -95,9 +96,9 @@ def make_shards(folder: Path, shards: Sequence[Shard], earlier: Lines, head: Lin
     Parameters
     ----------
     earlier : list of dict
-        Manifest of the folder; empty where there is none.
+        Manifest that the folder has already; empty if there is none.
     head : list of dict
-        Lines that the manifest begins with.
+        First lines of the new manifest.
     """
     wanted = {shard.key for shard in shards}
     standing = {made.key: made for made in shards_of(folder, earlier) if made.key in wanted and is_intact(made)}
@@ -116,9 +117,9 @@ def make_shard(shard: Shard) -> Shard:
     Raises
     ------
     InputError
-        Where this process has another rodcone or other packages than the one that asks.
+        If this process has another rodcone or other packages than the one that runs the sweep.
     OSError
-        Where an array can't be read, or the file not be written.
+        If an array can't be read, or the file can't be written.
     """
     if shard.key != shard_key(shard.samples):
         raise InputError(
@@ -149,7 +150,7 @@ def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
 
 
 def _write_manifest(folder: Path, head: Lines, shards: Iterable[Shard]) -> None:
-    """Write the manifest of the shards that are whole, in order of their names, as JSON lines."""
+    """Write the manifest of the given shards, in the order of their names, as JSON lines."""
     lines = head + [line for shard in sorted(shards, key=lambda shard: shard.path) for line in shard.lines]
     write_files({folder / MANIFEST: "".join(f"{json.dumps(line)}\n" for line in lines)})
 

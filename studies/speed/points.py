@@ -1,7 +1,8 @@
-"""A choice's time and error, and which choices no other beats in both; a render's error against two references.
+"""Measure the time and the error of settings ("choices") of a stage, and find those that no other beats in both.
 
-Their noise is independent of each other: the product of the differences from both, (d - r1)(d - r2), has the squared
-error of d as its expectation. The references' own noise falls out of its mean, though not out of its quantiles.
+A render's error is measured against two references, whose noise is independent of each other. The product of the
+render's differences from both, (d - r1)(d - r2), has the squared error of d as its expectation. So the references' own
+noise doesn't change the mean of the product, but it does change the quantiles.
 """
 
 import time
@@ -33,7 +34,7 @@ class Times:
     first_s : float
         First call, compilation included.
     seconds, processor_s : float
-        Medians of the later calls: on the clock, and of the processor (all threads together).
+        Medians over the later calls: time on the clock, and processor time of all threads together.
     """
 
     first_s: float
@@ -43,16 +44,17 @@ class Times:
 
 @dataclass(frozen=True)
 class Timing:
-    """Choice in a stage, with its times and its error.
+    """Setting that is tried in a stage, with its times and its error.
 
     Attributes
     ----------
     choice : str
     times : Times
     error_e : float
-        RMS [e-].
+        RMS error [e-].
     share : float or None
-        Squared error over the sensor's noise variance, mean of the pixels' own; None: mean over mean.
+        Mean over pixels of the squared error over the pixel's noise variance; None if only the ratio of the two means
+        is known.
     """
 
     choice: str
@@ -62,9 +64,9 @@ class Timing:
 
 
 def front(pairs: Sequence[tuple[float, float]]) -> list[bool]:
-    """Mark those of some (time, error) on the Pareto front: no other one is better in one and as good in the other.
+    """Mark the pairs (time, error) on the Pareto front: no other pair is better in one and as good in the other.
 
-    Of several equal ones only the first is marked.
+    Of several equal pairs only the first is marked.
     """
     flags = [False] * len(pairs)
     least = np.inf
@@ -75,10 +77,10 @@ def front(pairs: Sequence[tuple[float, float]]) -> list[bool]:
 
 
 def laps(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple[T, NDArray[np.float64]]]:
-    """Return the last result of each call, and the seconds of all its calls, shape (1 + repeats, 2).
+    """Call each function 1 + `repeats` times; return its last result and its seconds, shape (1 + repeats, 2).
 
-    The columns are seconds on the clock and of the processor. The calls take turns, so that other programs disturb all
-    of them alike.
+    The columns are seconds on the clock and of the processor. The functions take turns, so that other programs disturb
+    all of them alike.
     """
     results: dict[str, T] = {}
     seconds: dict[str, list[tuple[float, float]]] = {name: [] for name in calls}
@@ -91,7 +93,7 @@ def laps(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple[
 
 
 def time_calls(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple[T, Times]]:
-    """Return the last result and the times of each call; without repeats the time of the first call counts."""
+    """Return the last result and the times of each function; without repeats the time of the first call counts."""
     points = {}
     for name, (result, seconds) in laps(calls, repeats).items():
         points[name] = result, Times(float(seconds[0, 0]), *np.median(seconds[min(repeats, 1) :], axis=0).tolist())
@@ -107,10 +109,10 @@ def stage_json(
     ----------
     name, question : str
     reference : str
-        Choice from which errors are differences, and by whose times times are divided.
+        Name of the choice against whose result errors are measured, and by whose times the times are divided.
     noise_e : float
         Root mean square of the sensor's own noise, to compare the errors with.
-    points : sequence of Measured
+    points : sequence of Timing
     reference_times : Times
     """
     shares = [(point.error_e / noise_e) ** 2 if point.share is None else point.share for point in points]
@@ -145,13 +147,13 @@ class NoiseReference:
     ----------
     sensor : SensorConfig
     exposure_s : float
-        Auto exposure of the references' mean.
+        Exposure time, the mean of the automatic exposures of both references.
     references : pair of (channel, h, w) float64
         Expected electrons.
     noise_e2 : (channel, h, w) float64
         The sensor's own noise variance at the references' mean.
     inside : (channel, h, w) bool
-        Below full well, where no light is seen directly.
+        Pixels that count: below the full well, and without a directly visible lamp.
     """
 
     sensor: SensorConfig
@@ -169,7 +171,7 @@ def electrons(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: floa
 def yardstick(
     references: tuple[SpectralRadiance, SpectralRadiance], lamps: NDArray[np.bool_], sensor: SensorConfig
 ) -> NoiseReference:
-    """Fix exposure, noise and pixels by two references; `lamps` (h, w) are pixels that see a light directly."""
+    """Return exposure, noise and counted pixels for two references; `lamps` (h, w) marks pixels that see a lamp."""
     images = [form_image(reference, sensor) for reference in references]
     exposure_s = float(np.mean([auto_exposure_s(image, sensor) for image in images]))
     first, second = (electrons(reference, sensor, exposure_s) for reference in references)
@@ -190,8 +192,8 @@ def share_map(image_e: Image, yard: NoiseReference) -> Image:
 def pooled_share(squared_e2: Image, yard: NoiseReference) -> Image:
     """Return the mean over 3x3 pixels of each pixel's squared error over its own noise variance; NaN outside.
 
-    Only pixels inside count, and each by its own variance, so that a bright pixel's error isn't set against the noise
-    of a dark one.
+    Only pixels in `yard.inside` count. Each error is divided by its own pixel's variance, so that a bright pixel's
+    error isn't compared with the noise of a dark one.
     """
     weight = pooled(yard.inside.astype(np.float64))
     total = pooled(np.where(yard.inside, squared_e2 / yard.noise_e2, 0.0))
@@ -201,7 +203,7 @@ def pooled_share(squared_e2: Image, yard: NoiseReference) -> Image:
 def mean_error(image_e: Image, yard: NoiseReference) -> tuple[float, float]:
     """Return the RMS error [e-] and the mean share, over pixels and channels.
 
-    Both are estimated without the references' noise, which may leave less than 0; they are 0 then.
+    Both are estimates free of the references' noise, which may be negative; 0 is returned then.
     """
     first, second = yard.references
     squared_e2 = float(((image_e - first) * (image_e - second))[yard.inside].mean())

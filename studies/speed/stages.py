@@ -1,4 +1,4 @@
-"""What `rodcone bench` measures: each stage's choices, with errors in electrons, over pixels below saturation."""
+"""Measure the stages of `rodcone bench`: for several settings of each, time, and error in unsaturated pixels [e-]."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -115,7 +115,7 @@ def _bands(bench: Bench, scene: Scene, sensor: SensorConfig) -> tuple[Transport,
 
 
 def _samples(bench: Bench, scene: Scene, sensor: SensorConfig) -> Stage:
-    """Render with ever more samples, against two references whose own noise falls out of the mean."""
+    """Render with ever more samples, and compare with two references, whose own noise doesn't change the mean error."""
     call = partial(_render, bench, scene, *even_bands(VISIBLE_NM, 8))
     results = time_calls({f"{spp} samples": call(spp, bench.seed) for spp in bench.samples}, bench.repeats)
     most = 2 * bench.samples[-1]
@@ -133,7 +133,7 @@ def _samples(bench: Bench, scene: Scene, sensor: SensorConfig) -> Stage:
 
 
 def _lens(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposure_s: float, view_deg: float) -> Stage:
-    """Add the terms of the lens one after the other; all of them are the reference."""
+    """Add the terms of the lens one after the other; the lens with all of them is the reference."""
     plain = replace(sensor.lens, diffraction=0.0)
     falloff = replace(plain, horizontal_view_deg=view_deg)
     glare = replace(falloff, veiling_glare=0.01)
@@ -193,7 +193,7 @@ def _stage(
     timings: Mapping[str, tuple[T, Times]],
     error_e: Callable[[T], float],
 ) -> Stage:
-    """Measure each choice's error; the last choice's times are the reference's."""
+    """Measure the error of each choice; the last choice is the reference for the times."""
     points = [Timing(choice, times, error_e(result)) for choice, (result, times) in timings.items()]
     return stage_json(name, question, reference, noise_e, points, points[-1].times)
 
@@ -206,7 +206,7 @@ def _render(bench: Bench, scene: Scene, nm: Floats, width_nm: Floats, spp: int, 
 def _render_errors(
     bench: Bench, sensor: SensorConfig, reference: Transport
 ) -> tuple[Callable[[Transport], float], float]:
-    """Return what gives a render's error against the reference's mosaic [e-], and the sensor's own noise [e-]."""
+    """Return a function for a render's error against the reference's mosaic [e-], and the sensor's own noise [e-]."""
     exposure_s = _auto_exposure_s(bench, sensor, reference)
 
     def mosaic_e(transport: Transport) -> Image:
@@ -217,7 +217,7 @@ def _render_errors(
 
 
 def _mirrored(bench: Bench, transport: Transport) -> SpectralRadiance:
-    """Return a render as large as the bench's picture, filled with mirror images."""
+    """Return a render's radiance, continued by mirror images to the size of the bench's picture."""
     radiance = transport.relight(luminance_cd_m2=bench.level_cd_m2)
     times = -(-bench.picture // bench.size)
     wide = np.pad(radiance.values, [(0, (times - 1) * bench.size)] * 2 + [(0, 0)], mode="symmetric")

@@ -1,4 +1,4 @@
-"""Pictures to train on: full-resolution signals of every channel of a camera, under many lights.
+"""Draw pictures for training: signals of every channel of a camera at every pixel, under many lights.
 
 Generated ones (dead leaves, after A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", IJCV 41,
 2001, and gratings), and photographs from scikit-image's wheel, which become spectra by
@@ -45,7 +45,7 @@ LIGHTS = (
     "sodium_low",
 )
 KINDS = ("leaves",) * 20 + ("gratings",) * 10 + PHOTOGRAPHS
-UNKNOWN = 6  # one picture in so many has a light that the camera doesn't know
+UNKNOWN = 6  # one picture in this many has a light that the camera doesn't know
 SIDE = 256  # pixels of a generated picture
 NM = np.arange(385.0, 780.0, 10.0)
 _FINE = 3  # samples per pixel along each side, which are averaged
@@ -61,7 +61,7 @@ class KnownLight:
     def signals(self, reflectance: Floats) -> Floats:
         """Return the signals (..., channel) of reflectances (..., band).
 
-        What the camera takes for white has the value 1 in every channel.
+        A surface that the camera believes to be white has the value 1 in every channel.
         """
         return np.asarray(reflectance @ self.weights.T)
 
@@ -73,7 +73,7 @@ def neutral_ratios(sensor: SensorConfig, lights: Sequence[str]) -> Floats:
 
 
 def draw_light(rng: np.random.Generator, sensor: SensorConfig) -> KnownLight:
-    """Draw a light. The camera knows what white is under it, but for one in `UNKNOWN`, where it takes D65's."""
+    """Draw a light. In one case of `UNKNOWN` the camera is balanced to D65, else to the light itself."""
     collected = _collected(sensor, name := draw_illuminant(rng))
     white = _collected(sensor, "D65" if rng.random() < 1 / UNKNOWN else name).sum(axis=1, keepdims=True)
     return KnownLight(collected / white * white[3] / collected[3].sum())
@@ -102,7 +102,7 @@ def _collected(sensor: SensorConfig, light: str) -> Floats:
 
 
 def draw_surface(rng: np.random.Generator) -> Floats:
-    """Draw a smooth reflectance, shape (band,): grey, an edge, a bump, or seven random points joined."""
+    """Draw a smooth reflectance, shape (band,): grey, an edge, a bump, or a curve through seven random points."""
     kind = rng.random()
     width = band_widths(NM)
     low, high = np.sort(rng.uniform(0.03, 0.85, 2))
@@ -118,7 +118,10 @@ def draw_surface(rng: np.random.Generator) -> Floats:
 
 
 def leaf_picture(rng: np.random.Generator, light: KnownLight, shapes: int = 900) -> Floats:
-    """Draw shapes that cover one another, sizes as the power law of natural pictures, shape (SIDE, SIDE, channel)."""
+    """Draw shapes that cover one another; their sizes follow the power law of natural pictures.
+
+    The result has the shape (SIDE, SIDE, channel).
+    """
     side = SIDE * _FINE
     picture = np.empty((side, side, len(light.weights)))
     picture[:] = light.signals(draw_surface(rng))
@@ -192,7 +195,8 @@ def _finished(rng: np.random.Generator, fine: Floats) -> Floats:
 def photograph_signals(rng: np.random.Generator, light: KnownLight, name: str) -> Floats:
     """Return a photograph of `PHOTOGRAPHS` at half its size as signals under the light, shape (h, w, channel).
 
-    The basis has one spectrum for each colour. A random factor per channel stands for other spectra of the same colour.
+    The basis gives each colour one spectrum. Other spectra of the same colour are imitated by a random factor per
+    channel.
     """
     spectra = srgb_basis(NM)
     encoded = getattr(data, name)() / 255.0
@@ -208,7 +212,7 @@ def draw_pictures(
 ) -> Iterator[Planes]:
     """Draw training pictures one by one, each under a light of its own, (h, w, channel) float32.
 
-    Every second one gets grain, as a render's own noise and fine texture do.
+    Every second one gets grain, like that of a render's noise and of fine texture.
     """
     for kind, rng in zip(kinds, np.random.default_rng(seed).spawn(len(kinds)), strict=True):
         light = light_of(rng)

@@ -1,6 +1,6 @@
-"""Train the prior over patches of reflectance (`isp.design.spectral_prior`) on the pictures that `ple`'s is trained on.
+"""Train the prior over patches of reflectance (`isp.design.spectral_prior`) on the same pictures as the one of `ple`.
 
-Pictures are drawn in bands of reflectance, and projected on the reflectances' first principal directions.
+Pictures are drawn as reflectances in bands, and projected on the first principal directions of reflectances.
 """
 
 from functools import partial
@@ -37,7 +37,7 @@ _LEAST_REFLECTANCE = 5e-3  # mean of a patch below which it is mostly grain, and
 
 
 def train_spectral_prior(kind: str, seed: int, path: Path) -> str:
-    """Draw the pictures, fit the mixture and write it; the provenance, as JSON.
+    """Draw the pictures, fit the mixture and write it to a file; return the provenance as JSON.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def train_spectral_prior(kind: str, seed: int, path: Path) -> str:
 def _draw_light(rng: np.random.Generator, to_bands: NDArray[np.float64]) -> KnownLight:
     """Draw a light as a ratio to D65, and balance it as three channels can; one light in `UNKNOWN` isn't balanced.
 
-    Signals of channels then differ from each other as much as under the lights that `ple`'s prior knows.
+    The channels' signals then differ from each other as much as under the lights of the prior of `ple`.
     """
     widths = band_widths(NM)
     over_d65 = np.divide(*(illuminant(name).band_average(NM, widths) for name in (draw_illuminant(rng), "D65")))
@@ -92,7 +92,7 @@ def _draw_light(rng: np.random.Generator, to_bands: NDArray[np.float64]) -> Know
 
 
 def photographs_reflectances() -> NDArray[np.float64]:
-    """Return the `QUANTILES` of the luminous reflectance of photographs' patches; photographs count equally."""
+    """Return the `QUANTILES` of luminous reflectance over patches of photographs; each photograph has equal weight."""
     by_photograph = []
     for name in PHOTOGRAPHS:
         encoded = getattr(data, name)() / 255.0

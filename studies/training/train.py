@@ -1,6 +1,6 @@
-"""Train the prior of a camera's curves, with its provenance.
+"""Train a prior for the response curves of a camera, and state its provenance.
 
-A mixture of Gaussians over patches, by expectation and maximisation (Dempster, Laird & Rubin 1977).
+The prior is a mixture of Gaussians over patches, fitted by expectation and maximisation (Dempster, Laird & Rubin 1977).
 """
 
 import json
@@ -20,15 +20,15 @@ Matrix = NDArray[np.float32]
 
 COMPONENTS, DIRECTIONS, STEPS = 48, 112, 10  # Gaussians, principal directions, steps of expectation and maximisation
 PATCHES = 3500  # patches drawn per 65 536 pixels
-_LEAST_LIGHT = 5e-3  # mean of a patch, as a share of white, below which it is left out because it is mostly grain
+_LEAST_LIGHT = 5e-3  # patches with a mean below this share of white are left out, because they are mostly grain
 _FLOOR = 2e-6  # added to every variance
-_LEAST_PART = 1e-3  # probability that a patch belongs to a component, below which it doesn't count for it
+_LEAST_PART = 1e-3  # a patch counts for a component if it belongs to it with at least this probability
 
 
 def draw_patches(pictures: Iterable[Planes], rng: np.random.Generator) -> Matrix:
     """Draw patches that are turned and mirrored at random, shape (patch, 8 * 8 * 4).
 
-    Each number is the root of a signal over the patch's mean of W.
+    Each number is the square root of a signal, after division by the patch's mean of W.
     """
     rows = []
     for picture in pictures:
@@ -81,7 +81,7 @@ def fit_prior(
 
 
 def _first_parts(reduced: Matrix, rng: np.random.Generator) -> Matrix:
-    """Return which initial component each patch belongs to, shape (patch, component), 1 for its own and else 0.
+    """Return the initial component of each patch, as an array (patch, component) that is 1 for this one and else 0.
 
     One third of the components are formed by contrast, so that flat patches get their own; the rest by k-means.
     """
@@ -113,7 +113,7 @@ def _expect_and_maximise(reduced: Matrix, parts: Matrix) -> tuple[Matrix, Matrix
             part = parts[members_of, k, None]
             centres[k] = (part * reduced[members_of]).sum(axis=0) / members[k]
             off = reduced[members_of] - centres[k]
-            # The covariance of a component with few patches is drawn towards 0, because they can't determine it.
+            # A component's covariance is shrunk towards 0 if it has few patches, because they can't determine it.
             covariance = ((off * part).T @ off).astype(np.float64) / (members[k] + size)
             factors[k] = np.linalg.cholesky(covariance + _FLOOR * np.eye(size))
             inverse = np.linalg.inv(factors[k].astype(np.float64)).astype(np.float32)
@@ -134,7 +134,7 @@ def train_prior(sensor: SensorConfig, name: str, seed: int) -> Prior:
     Parameters
     ----------
     sensor : SensorConfig
-        A sensor, of which only the responses count.
+        Sensor whose responses are used; nothing else of it matters.
     name : str
         Name of the prior in the provenance.
     seed : int
@@ -152,7 +152,7 @@ def train_prior(sensor: SensorConfig, name: str, seed: int) -> Prior:
 
 
 def training_provenance(command: str, seed: int, pictures_sha256: str, patches: int) -> str:
-    """Return as JSON what a prior was trained from."""
+    """Return the provenance of a prior as JSON: command, seed, pictures, patches and versions."""
     source = {
         "command": command,
         "versions": {library: metadata.version(library) for library in _LIBRARIES},

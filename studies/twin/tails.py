@@ -1,8 +1,9 @@
 """Tails of a camera's dark noise: how far its histogram exceeds a normal one, and the random telegraph noise in it.
 
-By `sensor.pixel.PixelConfig.telegraph_e` a jump's height is exponential over pixels and its trap is read anew in each
-frame. The difference of two frames of a pixel is then 0, +-1 or +-2 heights, of the pixels with a trap 3/8, 1/2 and 1/8
-of them: normal noise and, of a share s, Laplace's distributions of the scales A and 2 A.
+In the model of `sensor.pixel.PixelConfig.telegraph_e` some pixels have a trap; over these the height of the jumps is
+exponentially distributed with the mean A. The state of a trap is random in each frame. So two frames of a pixel with a
+trap differ by 0, 1 or 2 heights, up or down, with the probabilities 3/8, 1/2 and 1/8. Besides normal noise the
+differences therefore have, for the share s of pixels with a trap, Laplace distributions with the scales A and 2 A.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,10 +20,10 @@ from rodcone.types import Floats
 from sensor.cameras.numbers import SourcedValue
 from sensor.emva1288.from_frames import NORMAL_95, Interval
 
-BLOCKS = 16  # parts of the rows, each left out in turn: the scatter of what remains gives the error
-LEAST_TOLD = 4.0  # errors that normal noise has, from which its excess is told from 0: one camera in 1e4, or fewer
-LEAST_NOISE_DN = 0.7  # under which rounding alone makes the histogram another than a normal one
-MOST_SHARE = 0.5  # of pixels with a trap: if more fit, pixels differ in their normal noise, which isn't jumps
+BLOCKS = 16  # the rows are divided into this many blocks; errors follow from leaving out one block after the other
+LEAST_TOLD = 4.0  # tails count above this many standard errors; by chance at most 1 camera in 1e4 has such tails
+LEAST_NOISE_DN = 0.7  # below this noise, rounding alone makes the histogram differ from a normal one
+MOST_SHARE = 0.5  # if more than this share of pixels may have a trap, pixels differ in their normal noise instead
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Telegraph:
 
 
 def noise_histograms(frames: Sequence[NDArray[Any]]) -> Floats:
-    """Count the differences of each pixel from one frame to the next by their size, (block of rows, DN)."""
+    """Count the absolute differences between pairs of frames, pixel by pixel, (block of rows, difference in DN)."""
     pairs = [np.abs(a.astype(np.int32) - b) for a, b in zip(frames[::2], frames[1::2], strict=False)]
     most = max(int(pair.max()) for pair in pairs) + 1
     parts = [np.array_split(pair, BLOCKS) for pair in pairs]
@@ -43,12 +44,12 @@ def noise_histograms(frames: Sequence[NDArray[Any]]) -> Floats:
 
 
 def is_rounding(histograms: Floats) -> bool:
-    """Return whether the noise is so small that the histogram is one of rounding."""
+    """Return whether the noise is so small that rounding alone shapes the histogram."""
     return sqrt(_moment(histograms.sum(axis=0), 2)) < sqrt(2) * LEAST_NOISE_DN
 
 
 def excess_kurtosis(histograms: Floats) -> tuple[float, float]:
-    """Return the excess kurtosis of the differences, 0 for normal noise, and the error that it then has."""
+    """Return the excess kurtosis of the differences, 0 for normal noise, and its standard error for normal noise."""
     whole = histograms.sum(axis=0)
     return _moment(whole, 4) / _moment(whole, 2) ** 2 - 3.0, sqrt(24 / float(whole.sum()))
 
@@ -56,17 +57,17 @@ def excess_kurtosis(histograms: Floats) -> tuple[float, float]:
 def tail_ratio(histograms: Floats) -> tuple[float, float]:
     """Return the mean square of the differences over the square of their mean size, and its standard error.
 
-    It is pi / 2 for normal noise, and more with tails (Geary 1935). Few pixels decide on the kurtosis of noise with
-    tails, which therefore differs by a factor of two from one chip to the next; they don't decide on this.
+    It is pi / 2 for normal noise, and more with tails (Geary 1935). The kurtosis of noise with tails depends on few
+    pixels, so that it differs by a factor of two from one chip to the next; this ratio doesn't.
     """
     return _with_error(histograms, lambda counts: np.array([_moment(counts, 2) / _moment(counts, 1) ** 2]))[0]
 
 
 def telegraph_of(histograms: Floats) -> Telegraph | None:
-    """Fit random telegraph noise to the differences; return None where there is none.
+    """Fit random telegraph noise to the differences; return None if there is none.
 
-    There is none where the tails aren't told from normal noise's, and where more than `MOST_SHARE` of the pixels would
-    have a trap.
+    There is none if the tails can't be distinguished from those of normal noise or of rounding, or if the interval of
+    the share of pixels with a trap reaches beyond `MOST_SHARE`.
     """
     excess, error = excess_kurtosis(histograms)
     whole = histograms.sum(axis=0)
@@ -82,7 +83,10 @@ def telegraph_of(histograms: Floats) -> Telegraph | None:
 
 
 def telegraph_numbers(frames: Sequence[NDArray[Any]], gain_dn_per_e: float, most_e: float) -> dict[str, SourcedValue]:
-    """Return a preset's numbers of the random telegraph noise in dark frames, `most_e` at most; none without tails."""
+    """Return a preset's numbers for the random telegraph noise in dark frames; return an empty dict without tails.
+
+    The height in electrons is at most `most_e`.
+    """
     found = telegraph_of(noise_histograms(frames))
     if found is None:
         return {}
@@ -102,7 +106,7 @@ def _moment(counts: Floats, order: int) -> float:
 
 
 def _with_error(histograms: Floats, measured: Callable[[Floats], Floats]) -> list[tuple[float, float]]:
-    """Measure the sum of the blocks, with errors by leaving out each in turn (the jackknife)."""
+    """Measure the sum of all blocks; standard errors follow from leaving out one block at a time (the jackknife)."""
     whole = histograms.sum(axis=0)
     without = np.array([measured(whole - one) for one in histograms])
     errors = np.sqrt((BLOCKS - 1) * np.var(without, axis=0))
@@ -110,17 +114,17 @@ def _with_error(histograms: Floats, measured: Callable[[Floats], Floats]) -> lis
 
 
 def _fit(counts: Floats, start: Floats) -> Floats:
-    """Return the likeliest logarithm of the normal spread, logit of the share and logarithm of the height."""
+    """Return the most likely logarithm of the normal noise's spread, logit of the share and logarithm of the height."""
 
     def loss(numbers: Floats) -> float:
-        spread, height = np.exp(numbers[[0, 2]])  # of heights far below the spread nothing is told
+        spread, height = np.exp(numbers[[0, 2]])  # heights far below the spread can't be found
         return -float(counts @ np.log(_shares(counts.size, spread, expit(numbers[1]), max(height, spread / 50))))
 
     return np.asarray(minimize(loss, start, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-2}).x)
 
 
 def _shares(size: int, spread: float, share: float, height: float) -> Floats:
-    """Compute the share of differences of each size up to the greatest, which takes all beyond it."""
+    """Compute the share of differences of each size in DN; the last one includes all larger sizes."""
     edges = np.arange(size, dtype=np.float64) - 0.5
     edges[0] = 0.0
     beyond = 2 * (1 - 5 / 8 * share) * ndtr(-edges / spread)
@@ -130,7 +134,7 @@ def _shares(size: int, spread: float, share: float, height: float) -> Floats:
 
 
 def _normal_laplace(edges: Floats, spread: float, scale: float) -> Floats:
-    """Compute the share of the sums of normal noise and Laplace's that lie above an edge."""
+    """Compute the probability that the sum of normal noise and Laplace-distributed noise lies above each edge."""
     ratio = spread / scale
     above = ratio**2 / 2 - edges / scale + log_ndtr(edges / spread - ratio)
     below = ratio**2 / 2 + edges / scale + log_ndtr(-edges / spread - ratio)

@@ -1,4 +1,4 @@
-"""A camera's twin: its preset measured from frames, and the same lights photographed with it, each figure tested."""
+"""A camera's twin: measure a preset from a camera's frames, simulate the same frames with it, and compare figures."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -30,9 +30,9 @@ from sensor.emva1288.from_frames import (
 from sensor.pixel import PixelConfig
 from studies.twin.tails import is_rounding, noise_histograms, tail_ratio, telegraph_numbers
 
-APART = 0.01  # level of significance at which two samples are told apart, for all tests of one kind together
+APART = 0.01  # significance level at which camera and twin count as different, for all tests of one figure together
 LEAST_BENT = 4  # least number of lights to which the response's bend is fitted
-MOST_BENT = 0.3  # largest bend that is tried
+MOST_BENT = 0.3  # largest bend of the response that is tried
 SIMULATED_UM = 5.0  # pitch of the simulated pixel, which doesn't matter for light given in electrons
 
 
@@ -48,7 +48,8 @@ class TwinFigure:
     low, high : float
         Ends of the 95 % interval of twin over camera.
     alike : bool
-        Whether a two-sample test at 1 %, shared by all tests of this figure, doesn't tell them apart.
+        Whether a two-sample test finds no significant difference. The level of 1 % is divided among all tests of this
+        figure.
     """
 
     name: str
@@ -76,7 +77,7 @@ class TwinFigure:
 
 @dataclass(frozen=True)
 class Response:
-    """Response of the twin: S = W f(e / well), f(x) = x (1 + bend (1 - x)), W being white above black.
+    """Response of the twin: the signal is S = W f(e / well), f(x) = x (1 + bend (1 - x)); W is white above black.
 
     Attributes
     ----------
@@ -103,7 +104,7 @@ class Response:
 
 @dataclass(frozen=True)
 class FramePair:
-    """Mean image and one frame of the camera and of its twin, under one light."""
+    """Mean image and one frame of the camera and of its twin under the same light."""
 
     camera_mean: Floats
     twin_mean: Floats
@@ -126,7 +127,7 @@ class Twin:
     camera_dn2, twin_dn2 : (light,) float64
         Temporal variance under each light that isn't clipped.
     signal_dn : (light,) float64
-        The camera's mean above the dark.
+        The camera's mean above that of the dark, under the same lights.
     dark, bright : FramePair
     comparisons : tuple of TwinFigure
     """
@@ -143,9 +144,9 @@ class Twin:
 
 
 def twin_of(frames: FrameSet, name: str, seed: int = 0) -> Twin:
-    """Measure a camera and photograph its lights with a simulated one.
+    """Measure a camera, and simulate its frames with a twin.
 
-    The simulated light has the camera's own mean at each light, and the smooth surface of its flat frames.
+    The simulated light has the camera's own mean under each light, and varies smoothly as the camera's flat frames do.
 
     Raises
     ------
@@ -211,7 +212,7 @@ def _pixels(light: LightFrames, frames: FrameSet) -> list[NDArray[Any]]:
 
 
 def _largest(frames: FrameSet, *, lit: bool, most_dn: float = np.inf) -> LightFrames:
-    """Return the light with the most frames, lit or dark; of several, the brightest whose mean is at most `most_dn`."""
+    """Return the light, lit or dark, with the most frames and a mean of at most `most_dn`; of several the brightest."""
     ranked = []
     for light in frames.lights:
         if light.lit is lit and len(light.frames) > 1:
@@ -222,11 +223,11 @@ def _largest(frames: FrameSet, *, lit: bool, most_dn: float = np.inf) -> LightFr
 
 
 def response_of(figures: FrameFigures) -> Response:
-    """Fit the response's bend to the variance by light, where the means by photons don't deny it.
+    """Fit the response's bend to the variance at each light, unless the means over photons contradict it.
 
-    Shot noise of e electrons has the variance (g f')^2 e of the mean g e f / x, so that variance over mean is
-    g f'^2 x / f: about g (1 + bend (1 - 3 x)). The mean over photons follows 1 + bend (1 - x). Lights count alike,
-    because real lamps scatter K by more than the frames' noise does.
+    With shot noise of e electrons the variance is (g f')^2 e and the mean g e f / x, so variance over mean, K, is
+    g f'^2 x / f: about g (1 + bend (1 - 3 x)). The mean over photons follows 1 + bend (1 - x). All lights have the same
+    weight in the fit, because fluctuations of real lamps scatter K by more than the frames' noise does.
     """
     white_dn = figures.white_dn - figures.black_dn
     points = [p for p in figures.points if p.clipped <= MOST_CLIPPED]
@@ -240,7 +241,7 @@ def response_of(figures: FrameFigures) -> Response:
     signal, gain, photons = signal[used], gain[used], photons[used]
 
     def fitted(bend: float) -> tuple[float, float]:
-        """Return the misfit of a bend, and the gain that fits best with it."""
+        """Return the squared error of the fit with a bend, and the gain that fits best with it."""
         slope = 1 + bend
         share = Response(bend, 1.0, "").light_e(signal, white_dn) / white_dn
         shape = (slope - 2 * bend * share) ** 2 / (slope - bend * share)
@@ -266,9 +267,10 @@ def _with_patterns(
     dark: Sequence[NDArray[Any]],
     bright: Sequence[NDArray[Any]],
 ) -> PixelNumbers:
-    """Numbers with the columns' share taken out of DSNU and PRNU, noise of rows and tails, response, and whole well.
+    """Return a preset's numbers with noise of columns, of rows and with tails, the response, and the full well.
 
-    Electrons are counted by the response's gain, and the full well from a black level in whole DN.
+    The columns' part is taken out of DSNU and PRNU. Electrons follow from the response's gain, and the full well from a
+    black level that is a whole number of DN.
     """
     gain = response.gain_dn_per_e
     black = round(figures.black_dn)
@@ -294,10 +296,10 @@ def _with_patterns(
 
 
 def _column_variance(frames: Sequence[NDArray[Any]]) -> float:
-    """Return the variance of the columns' means, without what the noise of a column's own pixels adds to it [DN^2].
+    """Return the variance of the columns' means, without the part that comes from noise of single pixels [DN^2].
 
-    It is found from the differences between neighbouring columns: real columns may decay slowly along the rows, while a
-    preset's columns are independent of each other.
+    It is computed from the differences between neighbouring columns, because a real camera's columns may also vary
+    slowly across the image, but a preset's columns are independent of each other.
     """
     image = without_surface(_mean_image(frames))
     of_pixels = float(np.mean(np.var(image, axis=0, ddof=1))) / int(image.shape[0])
@@ -308,7 +310,7 @@ def _column_variance(frames: Sequence[NDArray[Any]]) -> float:
 def _row_variance(frames: Sequence[NDArray[Any]]) -> float:
     """Return the temporal variance that the pixels of a row have in common [DN^2].
 
-    What the pixels' own noise adds to the variance of the row's mean is taken off.
+    The part of the variance of a row's mean that comes from noise of single pixels is subtracted.
     """
     mean = _mean_image(frames)
     freedom = (len(frames) - 1) / len(frames)
@@ -331,7 +333,7 @@ def _sensor(numbers: PixelNumbers, figures: FrameFigures) -> SensorConfig:
 
 
 def _site_light(electrons: Floats, figures: FrameFigures, shape: tuple[int, ...]) -> Floats:
-    """Return electrons that are given by position in the tile as an image (h, w)."""
+    """Return an image (h, w) of electrons from those at each position in the tile."""
     tile = electrons.reshape(len(figures.cfa), len(figures.cfa[0]))
     rows, columns = np.arange(shape[0]) % tile.shape[0], np.arange(shape[1]) % tile.shape[1]
     return np.asarray(tile[rows[:, None], columns[None, :]])
@@ -344,7 +346,10 @@ def _taken(
 
 
 def _relative_error(error_dn2: Floats, variance_dn2: Floats, stack: LightStack) -> float:
-    """Return the standard error of the ratio of two standard deviations, each the root of a mean over positions."""
+    """Return the relative standard error of the ratio of two standard deviations, camera's and twin's.
+
+    Each is the root of the mean variance over positions in the tile.
+    """
     camera = sqrt(float(np.sum(error_dn2**2))) / float(np.sum(variance_dn2))
     sites = stack.sites
     errors = [site.error_dn2 for site in sites]
@@ -353,7 +358,7 @@ def _relative_error(error_dn2: Floats, variance_dn2: Floats, stack: LightStack) 
 
 
 def _compared(name: str, place: str, camera: float, twin: float, error: float, tests: int) -> TwinFigure:
-    """Compare two positive figures by their ratio, whose standard error is relative."""
+    """Compare two positive figures by their ratio; `error` is its relative standard error."""
     ratio = twin / camera if camera > 0 else np.inf
     share = erfc(abs(ratio - 1) / error / sqrt(2)) if error > 0 and not isnan(ratio) else 0.0
     width = NORMAL_95 * error
@@ -361,7 +366,7 @@ def _compared(name: str, place: str, camera: float, twin: float, error: float, t
 
 
 def _of_pair(kind: str, camera: Sequence[NDArray[Any]], twin: Sequence[NDArray[Any]]) -> list[TwinFigure]:
-    """Compare the fixed pattern by rows, columns and pixels, and the noise of whole rows, of camera and twin."""
+    """Compare camera and twin by the fixed pattern of rows, columns and pixels, and by the noise of whole rows."""
     found = []
     images = [without_surface(_mean_image(frames)) for frames in (camera, twin)]
     height, width = images[0].shape
@@ -380,7 +385,7 @@ def _of_pair(kind: str, camera: Sequence[NDArray[Any]], twin: Sequence[NDArray[A
 
 
 def _of_tails(camera: Sequence[NDArray[Any]], twin: Sequence[NDArray[Any]]) -> list[TwinFigure]:
-    """Compare how far the temporal noise of dark frames exceeds normal noise, unless it is one of rounding."""
+    """Compare how far the tails of dark frames' temporal noise exceed normal ones, unless rounding alone shapes it."""
     both = [noise_histograms(frames) for frames in (camera, twin)]
     if any(map(is_rounding, both)):
         return []
