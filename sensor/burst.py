@@ -17,11 +17,11 @@ from sensor.pixel import Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.raw import RawImage
 from sensor.readings.best_estimate import CLEAR_SIGMAS
 
-BURST_WHITE_DN = 65_535.0  # of a merged burst, whose samples are no whole numbers
+BURST_WHITE_DN = 65_535.0  # white level of a merged burst, whose samples aren't whole numbers
 _Dark = TypeVar("_Dark", PixelConfig, Reading)
 _Sites: TypeAlias = float | NDArray[np.float64]
-LEAST_TEMPORAL = 0.1  # of a dark pixel's temporal variance, that is stated where noise took the light far under 0
-_ROUNDS = 6  # of the weights: a further one changes less than a thousandth of the merged noise
+LEAST_TEMPORAL = 0.1  # the stated temporal variance is at least this share of a dark pixel's, even far below 0
+_ROUNDS = 6  # rounds in which the weights are refined; one more changes the merged noise by less than a thousandth
 
 # Fields that all frames must share; and those of one exposure time, with which dark current goes.
 _CAMERA = ("cfa", "shape", "white_dn", "column_gain_spread")
@@ -35,10 +35,10 @@ class Merged:
     Attributes
     ----------
     rate_e_per_s : (h, w) float64
-        Photo-electrons a second behind each pixel's filter; negative where noise took it under 0. Where `saturated`,
-        what the shortest exposure holds: the least that it can be.
+        Photo-electrons per second behind each pixel's filter; noise can make it negative. Where `saturated`, it is what
+        the full well holds in the shortest exposure, so the true rate is at least this.
     temporal_variance, fixed_variance : (h, w) float64
-        Its variance over exposures, and over chips by DSNU and PRNU [(e-/s)^2].
+        Variance of the rate over exposures, and its variance over chips by DSNU and PRNU [(e-/s)^2].
     saturated : (h, w) bool
         Where even the shortest exposure is full.
     """
@@ -71,15 +71,16 @@ def merge_frames(frames: Sequence[RawImage]) -> Merged:
     uncorrelated with the differences between the frames, so a decision that follows it favours none of them. The
     remaining bias is under 1 % of a pixel's merged noise at any light.
 
-    The stated temporal variance follows the merged rate below 0 too, so that it is right in the mean of dark pixels. It
-    is at least a tenth of the dark's, which makes it 3 % too large at a temporal dark noise of 1.5 e-, 10 % at 1 e-.
+    The stated temporal variance follows the merged rate below 0 too, so that its mean over dark pixels is right. It is
+    at least a tenth of a dark pixel's variance; this makes it 3 % too large at a temporal dark noise of 1.5 e-, and
+    10 % at 1 e-.
     Fixed offsets are common to all frames, and no weight averages them away. Where they are several times as large as
     the temporal noise they disturb the weights, and are better subtracted first.
 
     Parameters
     ----------
     frames : sequence of RawImage
-        Of one camera and one scene; exposure times above 0, in any order.
+        Frames of one camera and one scene, with exposure times above 0, in any order.
 
     Raises
     ------
@@ -116,7 +117,7 @@ def merged_raw(frames: Sequence[RawImage]) -> RawImage:
     Parameters
     ----------
     frames : sequence of RawImage
-        As `merge_frames` takes them; a single frame is returned unchanged.
+        Frames as for `merge_frames`; a single frame is returned unchanged.
 
     Raises
     ------
@@ -173,7 +174,7 @@ def merged_raw(frames: Sequence[RawImage]) -> RawImage:
 
 
 def merged_sensor(sensor: SensorConfig, count: int) -> SensorConfig:
-    """Return the sensor whose one exposure of `count` times the time has the noise of a merged burst of `count`.
+    """Return a sensor whose single exposure, `count` times as long, has the noise of a merged burst of `count` frames.
 
     Its pixels aren't divided into photodiodes, because a burst of binned pixels isn't a binning of bursts. The variance
     of its quantisation is `count` times as large as that of the burst, which adds up `count` independent roundings.
@@ -235,9 +236,10 @@ def _grouped(frames: Sequence[RawImage]) -> list[_Group]:
 
 
 def _dark_noise(times_s: NDArray[np.float64], frames: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Return read noise and DSNU of a merged dark pixel [e- of all the time], from each frame's variance and DSNU.
+    """Return read noise and DSNU of a merged dark pixel, in electrons of the total time.
 
-    In the dark a frame's weight is the square of its time over its temporal variance.
+    `frames` hold each frame's temporal variance and DSNU. In the dark a frame's weight is the square of its time over
+    its temporal variance.
     """
     temporal_e2, dsnu_e = np.array(frames).T
     temporal_e2 = np.maximum(temporal_e2, 1e-30)  # without noise the times alone weigh

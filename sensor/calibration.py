@@ -1,4 +1,4 @@
-"""A camera's calibration, colour and noise: what its maker measures once, and a raw file carries to its developer."""
+"""A camera's calibration of colour and noise, which its maker measures once, and which its raw files hold."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -86,16 +86,16 @@ def _numbers(name: str, values: object, shape: tuple[int, ...]) -> Floats:
 
 @dataclass(frozen=True)
 class NoiseStep:
-    """Noise of samples from a level on: the terms of a `sensor.noise_law.NoiseLaw`, as a raw file holds them.
+    """Noise of samples above a level of light: the terms of a `sensor.noise_law.NoiseLaw`, as a raw file holds them.
 
     Attributes
     ----------
     from_e : float
-        Electrons above black from which it holds.
+        Electrons above black from which on the step holds.
     shot : float
-        Variance of a sample's shot noise over its electrons: over 1 where not all charges of a pixel count.
+        Variance of a sample's shot noise over its electrons. It is above 1 if not all charges of a pixel count.
     read_noise_e, dsnu_e, prnu : float
-        As `RawImage` has them.
+        As in `RawImage`.
     """
 
     from_e: Annotated[float, (0.0, 1e12, "give electrons")]
@@ -117,7 +117,7 @@ class NoiseStep:
 
 @dataclass(frozen=True)
 class ChannelNoise:
-    """Noise and well of a channel whose sites are read apart, in the raw image's electrons: `NoiseStep`'s form.
+    """Noise and full well of a channel whose pixels are read in a way of their own, in the raw image's electrons.
 
     Attributes
     ----------
@@ -125,11 +125,11 @@ class ChannelNoise:
     full_well_e : float
         Electrons at which its samples are full.
     shot, read_noise_e, dsnu_e, prnu : float
-        As `NoiseStep` has them; ``shot`` is 1 over the share of time and light that the sites take.
+        As in `NoiseStep`; ``shot`` is 1 over the share of time and light that the channel's pixels collect.
     dark_current_e : float
-        As `RawImage` has it.
+        As in `RawImage`.
     light_share : float
-        What a neutral density in front of its sites lets through.
+        Share of the light that a neutral density in front of its pixels lets through.
     """
 
     channel: str

@@ -1,4 +1,4 @@
-"""A photograph: radiance in, raw image out."""
+"""Take a photograph: make a raw image from radiance."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,8 @@ def photograph_radiance(
 ) -> RawImage:
     """Take one exposure: optics, expected electrons, readout.
 
-    What is left out is as `rodcone capture` has it by default; the same frame at every call then. A camera that shakes
-    (`LensConfig.shake_um`) takes a path of its own in each exposure.
+    Arguments that are left out have the defaults of `rodcone capture`, and every call then gives the same frame. A
+    camera that shakes (`LensConfig.shake_um`) takes a path of its own in each exposure.
 
     With Dr.Jit on LLVM or CUDA all of it runs there: signal in single precision, shot noise as
     `sensor.kernel.poisson` says (exact under 30 e-, distribution function within 5e-6 above). Otherwise, and with

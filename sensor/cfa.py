@@ -1,10 +1,10 @@
 """Colour filter arrays: a tile of channels, one letter each, that repeats over the sensor.
 
 Crosstalk mixes a tile's channels: a pixel hands the share c of its electrons to each of its four neighbours
-(`sensor.readout.spread_charge`). So a site reads (1 - 4 c) of the light behind its own filter, and c of that behind
-each neighbour's. What a channel reads of an even field is the mean over its sites, K e, where e are the electrons
-behind each filter alone and K the matrix `channel_mixing`. A camera's maker calibrates neutral and colour matrices for
-the channels K e, and development undoes the crosstalk first (`isp.crosstalk`).
+(`sensor.readout.spread_charge`). So a site, which is a pixel of the tile, reads (1 - 4 c) of the light behind its own
+filter, and c of that behind each neighbour's. In an even field the mean over a channel's sites is K e, where e are the
+electrons behind each filter alone, and K is the matrix `channel_mixing`. A camera's maker calibrates neutral and colour
+matrices for the channels K e, and development undoes the crosstalk first (`isp.crosstalk`).
 """
 
 import tomllib
@@ -21,7 +21,7 @@ from rodcone.types import Floats
 
 Tile: TypeAlias = tuple[str, ...]
 
-OWN = "own"  # in place of a mosaic's name: the one that the camera has
+OWN = "own"  # in place of a mosaic's name, this means the camera's own mosaic
 RGBW: Tile = ("RG", "BW")  # Parmar & Wandell 2009, Figure 2
 BAYER: Tile = ("RG", "GB")
 
@@ -148,7 +148,7 @@ def check_covers(tile: Tile, shape: tuple[int, ...]) -> None:
 
 
 def site_mixing(tile: Tile, crosstalk: float, light_shares: Mapping[str, float] | None = None) -> Floats:
-    """Return the electrons that a tile's sites read of an even field, over those behind each channel's filter.
+    """Return the electrons that each site of a tile reads in an even field, over those behind each channel's filter.
 
     Parameters
     ----------
@@ -156,8 +156,8 @@ def site_mixing(tile: Tile, crosstalk: float, light_shares: Mapping[str, float] 
     crosstalk : float
         Share of a pixel's electrons that goes to each of its four neighbours, 0 to 0.25.
     light_shares : mapping of str to float, optional
-        What the neutral density of a channel's sites lets through, where there is one. What such a site reads is
-        divided by its own share, as a raw image's electrons are.
+        For channels with a neutral density, the share of the light that it lets through. The reading of such a site is
+        divided by this share, as a raw image's electrons are.
 
     Returns
     -------

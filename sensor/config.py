@@ -18,12 +18,12 @@ from sensor.cfa import RGBW, Tile, block_sums, channels, check_covers, check_til
 from sensor.curves import Responses, rgbw
 from sensor.pixel import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
 
-BLACK_SIGMAS = 5.0  # black level in dark standard deviations, so that clipping at 0 doesn't bias darks
-METERED_SHARE = 0.8  # of the well: where exposure puts a frame's bright end, and up to which a gain takes it
+BLACK_SIGMAS = 5.0  # black level in standard deviations of dark noise, so that clipping at 0 doesn't bias dark samples
+METERED_SHARE = 0.8  # automatic exposure and gain bring a frame's bright end to this share of the well
 METERED_PERCENTILE = 99.0
 MOST_GAIN = 1024.0
-MOST_ROW_US = 1e5  # scanners read a row in less
-LONGEST_S = 0.066  # exposure time that a rule chooses at most: Parmar & Wandell 2009, Figure 5, 66 ms
+MOST_ROW_US = 1e5  # longest row time; even scanners read a row in less
+LONGEST_S = 0.066  # longest time that a rule of exposure chooses by default: Parmar & Wandell 2009, Figure 5, 66 ms
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class LensConfig:
                 f"scatter: {self.scatter:g} beside eye_age_years {self.eye_age_years:g}; allowed: a lens's wings or an "
                 "eye's; leave one out"
             )
-        if not self.table:  # whoever takes a table off leaves its hash
+        if not self.table:  # code that removes a table may leave its hash
             object.__setattr__(self, "table_digest", "")
 
 
@@ -327,7 +327,7 @@ def _check_even(sensor: SensorConfig, shape: tuple[int, ...]) -> None:
 
 
 def row_starts_s(sensor: SensorConfig, rows: int) -> Floats:
-    """Return when each row of the raw image starts its exposure, after the first one [s], shape (rows,)."""
+    """Return the time from the first start of an exposure to that of each row of the raw image [s], shape (rows,)."""
     order = np.arange(rows) if sensor.row_time_us >= 0 else np.arange(rows)[::-1]
     return np.asarray(order * (abs(sensor.row_time_us) * 1e-6))
 

@@ -1,4 +1,4 @@
-"""A camera from a TOML file: what a preset is, and what users copy and change."""
+"""Read a camera from a TOML file. Presets are such files, and users copy and change them."""
 
 import warnings
 from collections.abc import Sequence
@@ -22,8 +22,8 @@ _SETTINGS = (
     *("bits", "black_level_dn", "white_level_dn", "window_nm"),
     *("gain", "converter_noise_dn", "gain_limit", "row_time_us"),
 )
-MOST_PRNU = 0.1  # of a signal: sensors have 0.003 to 0.02
-MOST_OUTSIDE = 0.01  # share of a response outside the window
+MOST_PRNU = 0.1  # a larger PRNU is probably in per cent: sensors have 0.003 to 0.02 of the signal
+MOST_OUTSIDE = 0.01  # a warning is given if more than this share of a response lies outside the window
 OF_TABLES = ("csv", "quantum_efficiency", "ir_cut")  # keys of [responses] that may name a file
 _OF_READINGS = ("read_noise_e", "dsnu_e", "full_well_e")  # keys of each of several readings, in place of the pixel's
 
@@ -145,7 +145,7 @@ def _sensor(content: dict[str, Any], folder: Path, cfa: Tile | None) -> SensorCo
         _check_channels(tile, responses, table.responses.csv)
     else:
         responses = rgbw() if set(channels(tile)) <= set("RGBW") else built_in()
-    # Of another mosaic than the file's own, a channel that only that one has falls away.
+    # With another mosaic than the file's own, entries for channels that only the file's mosaic has are dropped.
     fallen = set(channels(tile_of(table.cfa))) - set(channels(tile)) if table.channels else set()
     apart = tuple(x for x in table.channels if x.channel not in fallen)
     if table.lens.table:

@@ -14,7 +14,7 @@ from sensor.photodiodes import check_chip
 from sensor.random import NoiseTerm, draw_key, normals
 from sensor.readings.resolve import by_site, chip_readings, several
 
-_MOST_KEPT = 1 << 18  # pixels of a chip whose draws are kept: 2 MB each
+_MOST_KEPT = 1 << 18  # draws of chips with at most this many pixels are cached, 2 MB each
 
 
 @dataclass(frozen=True)

@@ -21,12 +21,12 @@ from sensor.readings.resolve import at_channel, by_site, chip_readings, resolve
 from sensor.readout import spread_charge, unclipped_variance
 from sensor.response import behind_filters, channel_electrons, mixing_of
 
-MOST_FULL = 0.5  # share of full pixels above which an exposure is hardly meant, and a warning says so
-# A pixel is lit from this many deviations of dark noise on, which 3e-5 of dark pixels reach by chance; and the share of
-# lit pixels below which a warning says that the frame is dark.
+MOST_FULL = 0.5  # share of full pixels above which a warning says that the exposure is probably a mistake
+# A pixel counts as lit from this many standard deviations of dark noise on, which 3e-5 of dark pixels reach by chance.
+# If the share of lit pixels is below the second number, a warning says that the frame is dark.
 DARK_SIGMAS, LEAST_LIT = 4.0, 1e-3
 AUTO, AUTO_W, AUTO_INFORMATION = "auto", "auto:W", "auto:information"
-# What a camera exposes for, by the rule's name; in a mosaic without G `sensor.cfa.unit_channel` is in its place.
+# Rules by which a camera chooses its exposure; in a mosaic without G, `sensor.cfa.unit_channel` replaces G.
 RULES: Mapping[str, str] = MappingProxyType(
     {
         AUTO: "the 99th percentile of expected G at 80 % of the well",
@@ -34,10 +34,10 @@ RULES: Mapping[str, str] = MappingProxyType(
         AUTO_INFORMATION: "the time of a ladder that leaves the least expected error in the picture",
     }
 )
-# For `picture_error`: how much a neighbourhood's colour and a pixel's detail vary before anything is measured.
+# For `picture_error`: how much a neighbourhood's colour and a pixel's detail are expected to vary, before measurement.
 _COLOUR, _DETAIL = 0.2, 0.3  # relative standard deviations
-_TILES = 4  # tiles whose samples together show a neighbourhood's colour
-_CLEAR_SIGMAS = 3.0  # standard deviations below full well, from which on down a sample surely isn't clipped
+_TILES = 4  # tiles whose samples together determine a neighbourhood's colour
+_CLEAR_SIGMAS = 3.0  # a sample this many standard deviations below the full well surely isn't clipped
 _GAMMA = 2.4  # exponent of sRGB's encoding
 _DARKEST = 0.003  # share of white below which sRGB's encoding is a line
 _LADDER_THIRDS = -6, 19  # thirds of a stop below green's time: the first step of the ladder, and one past the last
@@ -67,9 +67,9 @@ def auto_exposure_s(
     channel : str, optional
         A channel of the mosaic; left out, G, or `sensor.cfa.unit_channel` of a mosaic without G.
     percentile : float
-        0 to 100, over all pixels as if each had the channel's filter.
+        Percentile of the light, 0 to 100, over all pixels as if each had the channel's filter.
     well_share : float
-        Above 0, up to 1.
+        Share of the well that this percentile fills, above 0 and up to 1.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def _dark_per_second_e(sensor: SensorConfig, channel: str) -> float:
 
 
 def at_level_s(unit_s: float, level: float, rule: str, sensor: SensorConfig) -> float:
-    """Return the exposure [s] by ``auto`` or ``auto:W`` in `level` times the light that takes `unit_s` without a limit.
+    """Return the exposure [s] by ``auto`` or ``auto:W`` at a level, if at level 1 it is `unit_s`, without a limit.
 
     Dark current doesn't grow with the light. If it makes up the share f of what fills the well in `unit_s`, the
     exposure is unit_s / (level + (1 - level) f).
@@ -131,7 +131,7 @@ def exposure_by_rule_s(
     Raises
     ------
     InputError
-        For an unknown rule, or a mosaic without the channel that it looks at.
+        For an unknown rule, or a mosaic without the channel that the rule uses.
     """
     return exposure_of_electrons_s(rule, channel_electrons(irradiance, sensor, 1.0), sensor, longest_s)
 
@@ -154,7 +154,7 @@ def exposed_by_rule(
 ) -> tuple[float, SensorConfig]:
     """Return the exposure [s] that one of `RULES` gives, and the camera at its gain.
 
-    The gain rises where the rule asks for more than the longest time (`amplified`).
+    The gain rises if the rule would need more than the longest time (`amplified`).
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def exposed_by_rule(
     require_range("longest_s", longest_s, 1e-9, 1e7, "give seconds above 0")
     names = sensor.channels
     unit = sensor.unit_channel
-    # Neighbours count as if they showed what a pixel shows itself.
+    # Crosstalk is counted as if each pixel's neighbours had the same light as the pixel itself.
     read_e = per_second_e @ mixing_of(sensor).T if sensor.pixel.crosstalk else per_second_e
     metered = "W" if rule == AUTO_W and "W" in names else unit
     wish_s = _share_of_well_s(read_e[..., names.index(metered)], sensor, metered, np.inf)
@@ -188,7 +188,7 @@ def amplified(sensor: SensorConfig, wish_s: float, longest_s: float) -> tuple[fl
     Parameters
     ----------
     wish_s : float
-        Time that fills the converter's range at the sensor's own gain; inf where there is no light.
+        Time that fills the converter's range at the sensor's own gain; inf without light.
     """
     times = min(wish_s / longest_s, sensor.gain_limit / sensor.gain)
     if times <= 1:
@@ -201,9 +201,8 @@ def best_exposure(
 ) -> tuple[float, SensorConfig]:
     """Choose the exposure [s] and gain, from a ladder, with the least expected error in the picture.
 
-    Of equal ones it is the longest. The ladder rises in thirds of a stop from a 64th of `green_s` to four times as
-    long; beyond `longest_s` it goes on in gains (`amplified`). It is scaled by the light, so that twice the light takes
-    half the time.
+    Of exposures with equal errors it is the longest. The ladder rises in thirds of a stop from a 64th of `green_s` to
+    four times `green_s`; beyond `longest_s` its steps are gains (`amplified`). Twice the light has half of all times.
 
     Parameters
     ----------
@@ -211,7 +210,7 @@ def best_exposure(
         Expected electrons behind each pixel's own filter in a second.
     sensor : SensorConfig
     green_s : float
-        Time by the rule ``auto``, without a longest one.
+        Time by the rule ``auto``, without a limit.
     longest_s : float
     """
     read_e = sensor.pixel_sums(spread_charge(per_second_e, sensor.photosites.pixel.crosstalk))
@@ -222,7 +221,7 @@ def best_exposure(
 
     def error(rung: tuple[float, SensorConfig]) -> float:
         time_s, camera = rung
-        spread = replace(camera, pixel=replace(camera.pixel, crosstalk=0.0))  # which `read_e` already is
+        spread = replace(camera, pixel=replace(camera.pixel, crosstalk=0.0))  # `read_e` includes crosstalk already
         return picture_error(few_e * time_s, spread, time_s)
 
     return min(apart, key=error)
@@ -269,7 +268,7 @@ def picture_error(expected_e: NDArray[np.float64], sensor: SensorConfig, exposur
     )
     clear = np.maximum(scipy.special.ndtr((full_e - expected_e) / np.sqrt(variance_e2) - _CLEAR_SIGMAS), 1e-12)
     noise_to_light = variance_e2 / (clear * np.maximum(expected_e, 1e-9) ** 2)
-    # Light over that of a white surface, a channel's white being the mean's colour at the bright end of all sites.
+    # Light over that of a white surface, which has the mean's colour and the brightness of the frame's bright end.
     shape, names = expected_e.shape, sensor.channels
     sites = {name: mask(sensor.cfa, name, shape) for name in names}
     relative = np.zeros(shape)
@@ -292,7 +291,7 @@ def picture_error(expected_e: NDArray[np.float64], sensor: SensorConfig, exposur
 
 
 def _dark_full(raw: RawImage) -> bool:
-    """Return whether dark current leaves light less than a tenth of the electrons that it takes itself."""
+    """Return whether dark current leaves less room in the well for light than a tenth of its own electrons."""
     return raw.full_well_e < 0.1 * raw.dark_current_e
 
 

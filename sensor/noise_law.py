@@ -1,4 +1,4 @@
-"""Variance of a sample as a law of its mean: the one formula of shot noise, dark noise, fixed offsets and PRNU."""
+"""Variance of a sample as a function of its mean: one formula for shot noise, dark noise, fixed offsets and PRNU."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -20,8 +20,8 @@ class NoiseLaw:
     Attributes
     ----------
     shot : float or array
-        Variance of shot noise per electron of the mean: 1 of Poisson counts, more where a sample stands for more
-        electrons than it counts.
+        Variance of shot noise per electron of the mean. It is 1 for Poisson counts, and more if a sample is scaled up
+        from fewer electrons.
     dark_e : float or array
         Standard deviation of the temporal noise that light doesn't change [e-].
     fixed_e : float or array

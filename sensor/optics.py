@@ -1,4 +1,4 @@
-"""From scene radiance to irradiance on the sensor, and what this leaves out of a lens.
+"""Compute the irradiance on the sensor from scene radiance, and list the effects of a lens that this leaves out.
 
 Where a lens spreads light the picture is transformed by cosines (DCT-II), which continue it as its own mirror image: no
 border darkens, and the sum of the light is kept to rounding. `form_image` transforms each band there and back in double
@@ -33,12 +33,14 @@ from sensor.shake import SHAKES, blur_variance
 # For the costs that `left_out` states.
 WAVELENGTH_NM = 550.0
 VIEW_DEG = 40.0  # angle of view for the falloff
-DIAGONAL = 1.25  # over the width of a picture of 4:3
-APERTURE_AT_NYQUIST = 2 / pi  # transfer of a square pixel there, sin(pi / 2) / (pi / 2)
-AIRY_DIAMETER = 2.44  # of the first dark ring, in wavelengths x f-number
-MOST_OVER_MEAN = 10.0  # of the brightest light over the mean, for single precision: its error grows with the brightest
-_AT_ONCE = 2**17  # frequencies at work on a thread: few enough for its cache
-_LEAST_LOSS = 5e-4  # of the MTF: a smaller one isn't stated
+DIAGONAL = 1.25  # diagonal of a 4:3 picture over its width
+APERTURE_AT_NYQUIST = 2 / pi  # transfer of a square pixel at the Nyquist frequency, sin(pi / 2) / (pi / 2)
+AIRY_DIAMETER = 2.44  # diameter of the first dark ring over wavelength x f-number
+# Single precision is used if the brightest light is at most this many times the mean; its error grows with the
+# brightest light.
+MOST_OVER_MEAN = 10.0
+_AT_ONCE = 2**17  # frequencies that a thread computes at once: few enough for its cache
+_LEAST_LOSS = 5e-4  # smaller losses of MTF aren't stated
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class SpectralIrradiance:
     width_nm : (band,) float64, optional
     signed : bool
     light : Spectrum, optional
-        As of `SpectralRadiance`.
+        As in `SpectralRadiance`.
     """
 
     values: NDArray[np.floating]
@@ -173,18 +175,18 @@ def image_sums(
     Parameters
     ----------
     radiance, sensor, samples_per_pixel
-        As `form_image` takes them.
+        As in `form_image`.
     weights : (sum, band) float64
-        Of irradiance, such as `sensor.response.electrons_per_irradiance`.
+        Weights of irradiance, such as `sensor.response.electrons_per_irradiance`.
 
     Raises
     ------
     InputError
-        As of `form_image`.
+        As in `form_image`.
     """
     imaged = _imager(radiance, sensor, samples_per_pixel, _enough(radiance))
     largest = float(np.abs(weights).max(initial=0.0)) or 1.0
-    # Electrons for each watt would leave the range of single precision.
+    # Weights in electrons per watt would be beyond the range of single precision.
     sums = imaged(weights / largest)
     sums *= largest
     return np.moveaxis(sums, 0, -1)

@@ -1,10 +1,11 @@
-"""Four photodiodes of one channel, 2x2, as one pixel of the raw image: binning.
+"""Binning: 2x2 photodiodes of one channel make one pixel of the raw image.
 
-In charge the four photodiodes empty into the floating diffusion that they share, which clips at its own well; column
-amplifier, read noise and converter come once, and the converter spans the well of the sum. Dark offsets are those of
-the photodiodes (DSNU: correlated double sampling takes the amplifier's own off), so four of them add; the column's
-offset comes once. In digital numbers each pixel is read by itself, and four readings are summed: 2 bits more, four
-times the black and the white level, four read noises and four roundings.
+When they bin in charge, the four photodiodes empty into the floating diffusion that they share, which clips at its own
+well. Column amplifier, read noise and converter then act once, and the converter's range is the well of the sum. Dark
+offsets (DSNU) are those of the photodiodes, because correlated double sampling removes the amplifier's own; so four of
+them add, but the column's offset comes once. When they bin in digital numbers, each photodiode is read by itself, and
+four readings are summed: with 2 bits more, four times the black and the white level, four read noises and four
+roundings.
 """
 
 from dataclasses import replace
@@ -19,11 +20,11 @@ from sensor.config import SensorConfig
 from sensor.pixel import BINNINGS, CHARGE, DIGITAL, Binning
 
 Gain: TypeAlias = Annotated[float, (1.0, 1024.0, "give a factor, 1 where a full well reads the converter's top")]
-MOST_BITS_SUMMED = 14  # of a converter whose readings are summed by four: a raw image holds 16
+MOST_BITS_SUMMED = 14  # most bits of a converter of whose readings four are summed: a raw image holds 16
 
 
 def binned(sensor: SensorConfig, way: str) -> SensorConfig:
-    """Return the camera of which 2x2 photodiodes make a pixel; `sensor` describes the photodiodes read one by one.
+    """Return the camera whose pixels are 2x2 photodiodes; `sensor` describes the photodiodes when read one by one.
 
     The numbers of the binned pixel follow from those of four photodiodes. Mean and variance of an evenly lit pixel are
     exact below the full well, with one exception: in digital binning the noise of the column gains misses half the

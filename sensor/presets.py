@@ -1,4 +1,4 @@
-"""Cameras by name, and with another mosaic, and where that needs it, other filters in front of their pixels.
+"""Cameras by name; and cameras with another mosaic and, if that needs them, other filters in front of their pixels.
 
 Presets are TOML files in `sensor/data`, which `rodcone new preset` copies for users to change.
 """

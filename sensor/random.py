@@ -12,7 +12,7 @@ _U32 = np.uint64(0xFFFFFFFF)
 MULTIPLIERS = (np.uint64(0xD2511F53), np.uint64(0xCD9E8D57))
 WEYL = (0x9E3779B9, 0xBB67AE85)
 ROUNDS = 10
-_PIXELS_AT_ONCE = 1 << 14  # a draw's random words take ten times its own memory: so they stay in the cache
+_PIXELS_AT_ONCE = 1 << 14  # random words take ten times a draw's memory; those of so few pixels stay in the cache
 
 
 class NoiseTerm(IntEnum):

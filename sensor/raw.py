@@ -1,4 +1,4 @@
-"""The raw image: what a camera's software is given, and nothing of the truth."""
+"""The raw image: all that a camera's software knows about an exposure, and nothing of the truth."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -44,22 +44,22 @@ class RawImage:
     camera : str
         Name of the camera: printable ASCII, as TIFF's tags hold it.
     f_number, iso : float or None
-        Of the lens, and the saturation-based speed (ISO 12232); None where not noted.
+        The lens's f-number, and the saturation-based speed (ISO 12232); None if they aren't stated.
     colour : ColourCalibration or None
-        Of the channels of `cfa`; None for a camera without colours, or one not calibrated.
+        Colour calibration of the channels of `cfa`; None for a camera without colours, or one that isn't calibrated.
     engine : str
-        What drew a simulated frame's noise: ``numpy`` (exact), or ``llvm`` or ``cuda``
+        Engine that drew a simulated frame's noise: ``numpy`` (exact), or ``llvm`` or ``cuda``
         (`sensor.kernel.poisson` states the error); empty where unknown, as for a file of another program.
     column_gain_spread : float
         Standard deviation of the columns' relative gain, in `prnu` too: full pixels of weak columns read less.
     defects : (n, 2) intp, optional
         Row and column of each defective pixel, as a camera's maker lists them; None where there is none.
     noise_steps : tuple of NoiseStep
-        Of a pixel read several times, the noise from each level on at which one reading is full; up to
-        the first one read_noise_e, dsnu_e and prnu hold.
+        For pixels that are read several times, the noise above each level at which one reading is full. Below the first
+        level `read_noise_e`, `dsnu_e` and `prnu` hold.
     channel_noise : tuple of ChannelNoise
-        Of channels that are read apart; what the others say of noise and well doesn't hold there. Their samples may
-        read more than `white_dn`.
+        Noise and full well of channels that are read in a way of their own; the other fields on noise and well don't
+        hold for them. Their samples may be above `white_dn`.
     dark_current_e : float
         Mean of the dark current in `black_dn` [e-], on which the columns' gains act as on light.
     crosstalk : float
@@ -249,7 +249,7 @@ def noise_at_sites(raw: RawImage, electrons: NDArray[np.floating]) -> NDArray[np
     Parameters
     ----------
     electrons : (h, w) float32 or float64
-        Of the mosaic, or of a part of it that begins with a whole tile.
+        Means of the mosaic's samples, or of a part of the mosaic that begins with a whole tile.
     """
     light = np.maximum(electrons, 0.0)
 

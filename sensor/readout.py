@@ -1,4 +1,4 @@
-"""From expected photo-electrons to digital numbers: every noise source in physical order, and their variance."""
+"""Read out a chip: digital numbers from expected photo-electrons, with every noise source in physical order."""
 
 from collections.abc import Callable, Sequence
 from math import hypot, sqrt
@@ -27,7 +27,7 @@ DrawFrame: TypeAlias = Callable[[NDArray[np.floating], SensorConfig, Device, flo
 # Far above any well, and inside 64-bit integers. One bound for all: what a pixel takes from its row's stream depends on
 # its mean, so readings of one charge, whose wells differ, draw the same electrons only from the same means.
 _MOST_E = 1e15
-LEAST_SLOPE = 1e-3  # of a clipped sample's mean by the light: beyond it the sample tells nothing
+LEAST_SLOPE = 1e-3  # with a smaller slope of its mean over the light, a clipped sample says nothing about the light
 
 
 def draw_frame(
@@ -88,7 +88,7 @@ def convert(
 
 
 def pixel_read_noise_e(converter: SensorConfig) -> float:
-    """Normal part of the read noise that each pixel has by itself [e-]."""
+    """Return the normal part of the read noise that each pixel has by itself [e-]."""
     parts_e2 = converter.pixel.row_noise_e**2 + converter.pixel.telegraph_noise_e**2
     return sqrt(max(converter.read_noise_e**2 - parts_e2, 0.0)) if parts_e2 else converter.read_noise_e
 
@@ -149,13 +149,13 @@ def read_out(
     device : Device
         The chip; its patterns are not drawn again.
     exposure_s : float
-        For the dark current, and noted in the raw image [s].
+        Exposure time [s], for the dark current; the raw image states it.
     rng : numpy.random.Generator
         Gives one key; draws depend on key, row, column and term alone (shot noise: one stream a row).
     draw : callable
-        What draws the frame: `draw_frame`, or `sensor.kernel.kernel.read_frame` in Dr.Jit.
+        Function that draws the frame: `draw_frame`, or `sensor.kernel.kernel.read_frame` in Dr.Jit.
     engine : str
-        What it runs on, noted in the raw image.
+        Name of the engine on which `draw` runs; the raw image states it.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def read(
     draw: DrawFrame = draw_frame,
     engine: str = "numpy",
 ) -> RawImage:
-    """Draw each reading of one exposure and merge them; parameters as of `read_out`, the camera resolved."""
+    """Draw each reading of one exposure and merge them; parameters are as in `read_out`, with the camera resolved."""
     keys = {charge: draw_key(rng) for charge in dict.fromkeys(x.charge for x in readings)}
     raws = []
     for number, (x, light_e) in enumerate(zip(readings, light_of(expected_e, readings), strict=True)):
@@ -239,7 +239,7 @@ def noise_variance(
         `SensorConfig.pixel_sums`.
     sensor : SensorConfig
     exposure_s : float
-        For the dark current [s].
+        Exposure time [s], for the dark current.
     channel : str, optional
         Channel of all pixels; left out, they are those of a mosaic, (h, w). It changes nothing for a camera that reads
         all channels alike.
@@ -262,9 +262,9 @@ def frame_moments(expected_e: NDArray[np.float64], readings: Sequence[PlainReadi
 
 
 def light_variance(expected_e: NDArray[np.float64], readings: Sequence[PlainReading]) -> NDArray[np.float64]:
-    """Return the variance of the light as estimated from each sample [e-^2].
+    """Return the variance of an estimate of the light from each sample [e-^2].
 
-    It is the clipped sample's variance over the square of the slope with which the sample's mean follows the light.
+    It is the clipped sample's variance over the square of the slope of the sample's mean over the light.
     Near the full well this slope falls towards 0, so that the variance grows without bound.
     """
     moments = frame_moments(expected_e, readings)
@@ -274,7 +274,7 @@ def light_variance(expected_e: NDArray[np.float64], readings: Sequence[PlainRead
 def unclipped_variance(expected_e: NDArray[np.float64], readings: Sequence[PlainReading]) -> NDArray[np.float64]:
     """Return the variance that a frame's samples would have without clipping [e-^2].
 
-    Callers use its root as the unit in which they state how far a pixel's mean is from the full well.
+    Callers use its root as the unit for the distance of a pixel's mean from the full well.
     """
     light_e = collected_e(expected_e, readings)
     if several(readings):
@@ -317,8 +317,8 @@ def as_raw(
 ) -> RawImage:
     """Make a raw image of a frame that `engine` drew, with the camera's calibration and the chip's list of hot pixels.
 
-    Black is the mean that covered pixels read. Dark current raises it, and adds to both kinds of dark noise: its own
-    shot noise to the temporal one, and what the columns' gains make of it to the fixed one.
+    Black is the mean reading of covered pixels. Dark current raises it, and adds to both kinds of dark noise: its shot
+    noise to the temporal one, and its differences by the columns' gains to the fixed one.
     """
     hot = None if hot is None else sensor.pixel_sums(hot)
     pixel = sensor.pixel

@@ -1,4 +1,4 @@
-"""From irradiance to expected photo-electrons: the channels' responses, the exposure and the camera's window."""
+"""Compute expected photo-electrons from irradiance, by the channels' responses, exposure time and camera's window."""
 
 import warnings
 from collections.abc import Sequence
@@ -17,10 +17,10 @@ from sensor.cfa import channel_mixing, channels, check_covers, mask
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance, form_image, image_sums, spreads
 
-MOST_LOST = 0.5  # of a channel's response: with less than half of it a picture doesn't show that channel
+MOST_LOST = 0.5  # bands that leave out more than this share of a channel's response are refused
 NARROW_NM = 20.0  # no filter of a camera is narrower
-LEAST_WARNED = 5e-3  # of a channel's response: no warning under it
-_STEP_NM = 1.0  # of the wavelength grid on which shares are summed
+LEAST_WARNED = 5e-3  # a smaller lost share of a channel's response gives no warning
+_STEP_NM = 1.0  # step of the wavelength grid on which shares are summed
 
 
 def electrons_per_irradiance(
@@ -48,8 +48,8 @@ def electrons_per_irradiance(
     Warns
     -----
     UserWarning
-        Where the bands don't fill the camera's window: what each channel loses; where all responses end within
-        `NARROW_NM` of one another, as of an EMVA report's one wavelength.
+        If the bands don't fill the camera's window, on what each channel loses; if all responses lie within
+        `NARROW_NM`, as for an EMVA report with a single wavelength.
     """
     check_window(sensor.window_nm, wavelength_nm, width_nm)
     _check_covered(sensor, wavelength_nm, width_nm)
@@ -116,9 +116,10 @@ def imaged_electrons(
 ) -> NDArray[np.float64]:
     """Return `channel_electrons` of `form_image`, shape (h, w, channel), computed faster for a lens that spreads light.
 
-    There it takes a quarter of the time, and where no undershoot is cut off it is within 1e-6 of the pixel's own light
-    and the picture's mean together (`sensor.optics.image_sums`). Parameters are as of these two. Radiance that comes
-    band by band is held as a whole only where a pixel is one sample and the lens doesn't spread.
+    For such a lens it takes a quarter of the time. Where no undershoot is cut off, the difference is within 1e-6 of the
+    pixel's own light and the picture's mean together (`sensor.optics.image_sums`). The parameters are those of these
+    two functions. Radiance that comes band by band is in memory as a whole only if a pixel is one sample and the lens
+    doesn't spread light.
     """
     if samples_per_pixel == 1 and not spreads(sensor.lens):
         whole = radiance.whole() if isinstance(radiance, BandRadiance) else radiance
@@ -158,7 +159,7 @@ def expected_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exp
 
 
 def mixing_of(sensor: SensorConfig) -> Floats:
-    """Return what each channel of a raw image reads of an even field, over the electrons behind each filter.
+    """Return the electrons that each channel of a raw image reads in an even field, over those behind each filter.
 
     This is `sensor.cfa.channel_mixing`: a maker's calibration sees the channels as crosstalk mixes them.
     """
@@ -186,8 +187,8 @@ def behind_filters(electrons: NDArray[np.float64], sensor: SensorConfig) -> NDAr
 def check_window(window_nm: tuple[float, float], wavelength_nm: Floats, width_nm: Floats) -> None:
     """Raise `InputError` if a camera's window opens beyond 380-780 nm and the bands don't reach that far.
 
-    Absent bands count as dark. Within 380-780 nm that is the scene's choice; beyond, it would hide that a W pixel may
-    collect 16-35 % of its electrons there. Less than one band may be missing.
+    Missing bands count as dark. Within 380-780 nm a scene may leave bands out; beyond, it would go unnoticed that a W
+    pixel may collect 16-35 % of its electrons there. A gap of less than one band is allowed.
     """
     low, high = window_nm
     beyond = ((low, min(VISIBLE_NM[0], high), width_nm[0]), (max(VISIBLE_NM[1], low), high, width_nm[-1]))
@@ -209,12 +210,12 @@ def lost_shares(sensor: SensorConfig, wavelength_nm: Floats, width_nm: Floats) -
     ----------
     sensor : SensorConfig
     wavelength_nm, width_nm : (band,) float64
-        Of the scene.
+        Bands of the scene.
 
     Returns
     -------
     dict of str to float
-        0 to 1 by channel.
+        Share by channel, 0 to 1.
     """
     low, high = sensor.window_nm
     edges = np.linspace(low, high, max(2, round((high - low) / _STEP_NM) + 1))

@@ -1,17 +1,18 @@
 """Camera shake: how the image moves on the sensor while a hand holds the camera, and the blur that this leaves.
 
-Muscles push the hand at random and it answers as a damped oscillator: the second-order stochastic process by which
+Muscles push the hand at random, and it responds like a damped oscillator: the second-order stochastic process by which
 Timmer, Lauk, Pfleger & Deuschl, "Cross-spectral analysis of physiological tremor and muscle activity I", Biological
 Cybernetics 78 (1998), describe measured hand tremor. An axis of the image, of variance s^2, has the one-sided spectrum
 
     S(f) = 4 zeta f0^3 s^2 / pi / ((f0^2 - f^2)^2 + (2 zeta f0 f)^2).
 
-f0 is 4 Hz, as accelerometers on hand-held cameras measured (Japanese Journal of Ergonomics 31 (6), 399, 1995). Ours are
-zeta, a broad resonance, and s: at the speed that this gives, the photographers' longest time by hand, 1 s over the
-focal length in mm on film of 35 mm, draws a point out to that film's circle of confusion, 30 um.
+f0 is 4 Hz, as accelerometers on hand-held cameras measured (Japanese Journal of Ergonomics 31 (6), 399, 1995). Two
+values are our choice: zeta, which makes the resonance broad, and s. Photographers expose by hand for at most 1 s over
+the focal length in mm, on film of 35 mm. s is chosen so that the image of a point then moves by that film's circle of
+confusion, 30 um.
 
-Of a sensor whose rows roll each row sees the part of the path within its own exposure, so that upright lines lean and
-bend, and the picture is stretched and squeezed.
+If a sensor's rows roll, each row sees the part of the path within its own exposure. So upright lines lean and bend, and
+the picture is stretched and squeezed.
 """
 
 import os
@@ -30,9 +31,9 @@ from sensor.config import LensConfig, SensorConfig, check_frame, row_starts_s
 from sensor.random import NoiseTerm, draw_key, normals
 
 RESONANCE_HZ, DAMPING = 4.0, 0.5
-POLE_PER_S = 2 * pi * RESONANCE_HZ * complex(-DAMPING, sqrt(1 - DAMPING**2))  # of the oscillator
-SPEED_RAD_PER_S = 0.030 / sqrt(2)  # of each axis, root mean square: 30 um in 1/F s behind F mm, both axes together
-FOCAL_LENGTH_MM = 6.0  # of a compact camera with Table 1's pixel
+POLE_PER_S = 2 * pi * RESONANCE_HZ * complex(-DAMPING, sqrt(1 - DAMPING**2))  # pole of the oscillator
+SPEED_RAD_PER_S = 0.030 / sqrt(2)  # rms angular speed of each axis: 30 um in 1/F s behind F mm, both axes together
+FOCAL_LENGTH_MM = 6.0  # focal length of a compact camera with Table 1's pixel
 # Standard deviation of the image along each axis [um], by the name that `shake` options take.
 SHAKES: Mapping[str, float] = MappingProxyType(
     {"hand": SPEED_RAD_PER_S / (2 * pi * RESONANCE_HZ) * FOCAL_LENGTH_MM * 1e3}
@@ -65,7 +66,7 @@ def blur_variance(exposure_s: float) -> float:
     if exposure_s == 0:
         return 0.0
     turn = POLE_PER_S * exposure_s
-    # Short times would cancel: (exp(x) - 1 - x - x^2 / 2) as a series there.
+    # For short times the terms would cancel, so exp(x) - 1 - x - x^2 / 2 is computed as a series there.
     rest = turn**3 / 6 * (1 + turn / 4 + turn**2 / 20) if abs(turn) < 1e-2 else np.exp(turn) - 1 - turn - turn**2 / 2
     return float(-2 * ((1 + 1j * POLE_PER_S.real / POLE_PER_S.imag) * rest / turn**2).real)
 
@@ -86,7 +87,7 @@ def _step_count(time_s: float, longest_s: float = STEP_S) -> int:
 
 def _walk(step_s: float, count: int, key: int) -> NDArray[np.float64]:
     """Draw `count` positions of the image, `step_s` apart, around their mean, in units of s; shape (axis, time)."""
-    # Place and speed / (2 pi f0), both of variance 1, taken on exactly: z' = A z + B n with B B^T = 1 - A A^T.
+    # Position and speed / (2 pi f0), both with variance 1, are advanced exactly: z' = A z + B n, B B^T = 1 - A A^T.
     turn = np.exp(POLE_PER_S * step_s)
     advance = turn.real * np.eye(2) + turn.imag / sqrt(1 - DAMPING**2) * np.array([[DAMPING, 1.0], [-1.0, -DAMPING]])
     values, vectors = np.linalg.eigh(np.eye(2) - advance @ advance.T)
@@ -108,19 +109,19 @@ def rolling_path(
     Parameters
     ----------
     starts_s : (row,) float64
-        When each row's exposure starts [s].
+        Time at which each row's exposure starts [s].
     exposure_s : float
-        Of a row, above 0 [s].
+        Exposure time of a row, above 0 [s].
     key : int
     longest_s : float
-        Of the steps between places.
+        Longest step between two positions [s].
 
     Returns
     -------
     places : (axis, time) float64
-        As `path` gives them; the mean over all rows' time is the framing.
+        Positions as in `path`, around their mean over the time of all rows.
     shares : (row, time) float64
-        Of `row_shares`.
+        Weights from `row_shares`.
     """
     whole_s = float(np.max(starts_s)) + exposure_s
     count = _step_count(whole_s, longest_s)
@@ -135,7 +136,7 @@ def row_shares(starts_s: Floats, exposure_s: float, step_s: float, count: int) -
     """
 
     def until(time_s: Floats) -> Floats:
-        # integral of the tent about each place, whose height is 1 and whose half width 1 step
+        # Integral of the tent around each position, whose height is 1 and whose half width is 1 step.
         steps = np.clip(time_s[:, None] / step_s - np.arange(count), -1.0, 1.0)
         return np.asarray(0.5 + steps - steps * np.abs(steps) / 2)
 
@@ -144,22 +145,23 @@ def row_shares(starts_s: Floats, exposure_s: float, step_s: float, count: int) -
 
 
 def moved_by_rows(electrons: NDArray[np.float64], places_px: Floats, shares: Floats) -> NDArray[np.float64]:
-    """Return what each row collects of an image that moves, shape (h, w, channel).
+    """Return the electrons that each row collects from an image that moves, shape (h, w, channel).
 
     Parameters
     ----------
     electrons : (h, w, channel) float64
-        Of a still camera.
+        Electrons of a still camera.
     places_px : (2, time) float64
-        How far the image lies down and to the right.
+        Positions of the image, downwards and to the right [pixels].
     shares : (h, time) float64
-        Of each place in a row's exposure.
+        Weight of each position in a row's exposure.
 
     Notes
     -----
-    A row's sum over places is taken in the spectrum along it, so that each place costs a transform along the columns.
-    The picture goes on as its mirror image. Undershoot becomes 0, and each channel keeps the sum it had before that,
-    which isn't the still picture's: a lamp that moves with the rolling rows is seen by more of them.
+    A row's sum over positions is computed in the spectrum along the row, so that each position costs a transform along
+    the columns. The picture continues as its mirror image. Undershoot becomes 0, and each channel keeps the sum that it
+    had before that. This isn't the still picture's sum, because a lamp that moves with the rolling rows is seen by more
+    of them.
     """
     height, width, channels = electrons.shape
     threads = os.cpu_count() or 1
@@ -190,7 +192,7 @@ def shaken(
     Parameters
     ----------
     electrons : (h, w, channel) float64
-        Of a still camera, as `sensor.response.channel_electrons`.
+        Electrons of a still camera, as from `sensor.response.channel_electrons`.
     sensor : SensorConfig
         Its lens's `shake_um` is the standard deviation of the image's position; 0 draws nothing. Its `row_time_us` is
         the delay between the starts of two rows.

@@ -1,4 +1,4 @@
-"""Figures of an EMVA 1288 report that contradict one another, or look like another unit than the one that is asked.
+"""Find figures of an EMVA 1288 report that contradict one another, or seem to be in another unit than the required one.
 
 K, saturation, dark noise, SNR, dynamic range and the converter's range determine one another (release 4.0 Linear):
 SNR_max = sqrt(mu_e.sat), mu_e.min = sqrt(sigma_d^2 + sigma_q^2 / K^2) + 1/2 with sigma_q^2 = 1/12 DN^2, DR = mu_e.sat /
@@ -8,10 +8,10 @@ mu_e.min, and K mu_e.sat fits between black and the converter's top.
 from collections.abc import Mapping
 from math import log10, sqrt
 
-MOST_OFF_DB = 1.5  # of SNR and dynamic range: saturation's measured value scatters by some per cent, and is rounded
-MOST_OVER = 1.1  # of the converter's range: noise and offset put the measured saturation a few per cent off
-LEAST_PER_CENT = {"eta": 1.0, "PRNU1288": 0.03}  # smaller ones look like fractions; sensors have 10 to 95, 0.2 to 2
-LEAST_SATURATION_E = 200.0  # a smaller one looks like thousands of electrons; sensors have 2000 to 200 000
+MOST_OFF_DB = 1.5  # allowed error of SNR and dynamic range: measured saturation scatters by some per cent
+MOST_OVER = 1.1  # allowed saturation over the converter's range: noise and offset shift it by a few per cent
+LEAST_PER_CENT = {"eta": 1.0, "PRNU1288": 0.03}  # less looks like a fraction; sensors have 10 to 95 % and 0.2 to 2 %
+LEAST_SATURATION_E = 200.0  # less looks like thousands of electrons; sensors have 2000 to 200 000 electrons
 
 
 def doubts(figures: Mapping[str, float], bits: int | None, black_dn: int | None) -> list[str]:
@@ -20,9 +20,9 @@ def doubts(figures: Mapping[str, float], bits: int | None, black_dn: int | None)
     Parameters
     ----------
     figures : mapping of str to float
-        By symbol; those that a report lacks are left out.
+        The report's figures by symbol; those that it lacks are left out.
     bits, black_dn : int or None
-        Of the operating point.
+        The converter's bits and the black level of the operating point; None if the report doesn't state them.
     """
     told = [
         f"{name} = {figures[name]:g} per cent looks like a fraction; give {100 * figures[name]:g} if it is one"

@@ -1,4 +1,4 @@
-"""An EMVA 1288 report as a short TOML file in the report's own symbols, and the pixel that it describes.
+"""Read an EMVA 1288 report from a short TOML file with the report's own symbols, and get the pixel that it describes.
 
 Equations are numbered as in release 4.0 Linear of the standard.
 """
@@ -19,7 +19,7 @@ from rodcone.toml_file import read_toml
 from sensor.cameras.emva_checks import doubts
 from sensor.cameras.numbers import PixelNumbers, SourcedValue
 
-# Symbols, each with what is allowed and its unit. Those of RESULTS follow from the others: a check, and no input.
+# Symbols, each with its range and its unit. Those of RESULTS follow from the others and only serve as a check.
 _SYMBOLS: dict[str, dict[str, tuple[float, float, str]]] = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text("utf-8")
 )
@@ -30,16 +30,16 @@ _WHOLE = {"bits": (1, 16), "black_level_dn": (0, 65_534)}
 
 @dataclass(frozen=True)
 class EmvaReport:
-    """What a report says.
+    """Content of a report.
 
     Attributes
     ----------
     camera, maker, source, date : str
-        The camera with its operating point; where the numbers stand, and when that was published.
+        The camera with its operating point, its maker, the document that states the numbers, and its date.
     bits, black_level_dn : int or None
-        Of the operating point; None where not told.
+        The converter's bits and the black level of the operating point; None if the report doesn't state them.
     figures : mapping of str to float
-        By symbol of `INPUTS` and `RESULTS`.
+        Values by symbol of `INPUTS` and `RESULTS`.
     """
 
     camera: str
@@ -193,7 +193,7 @@ def clip_over_saturation(saturation_e: float, sigma_d: float, prnu: float) -> fl
     mean_e = light_e[:, None] * (1 + prnu * nodes)
     variance_e2 = np.maximum(mean_e, 0.0) + sigma_d**2
     clip_e = saturation_e
-    for _ in range(8):  # the correction is a few per cent at first, and then what the last one missed
+    for _ in range(8):  # the first correction is a few per cent; each later one removes what is left
         z = (clip_e - mean_e) / np.sqrt(variance_e2)
         above = scipy.special.ndtr(-z)
         density = np.exp(-(z**2) / 2) / sqrt(2 * pi)

@@ -20,8 +20,8 @@ from rodcone.files import inside, read_bounded
 from sensor.cfa import Tile
 from sensor.raw_files.raw_file import read_raw
 
-MOST_BYTES = 1 << 24  # of a descriptor or a list
-MOST_ZIP_BYTES = 1 << 33  # of an unpacked zip file
+MOST_BYTES = 1 << 24  # largest descriptor or list
+MOST_ZIP_BYTES = 1 << 33  # largest zip file, unpacked
 MOST_FRAMES = 10_000
 LIST_NAME = "frames.csv"
 LIST_HEAD = ("file", "kind", "exposure_s", "photons")
@@ -35,12 +35,12 @@ Frame = Path | NDArray[Any]
 
 @dataclass(frozen=True)
 class LightFrames:
-    """Frames of one light.
+    """Frames under one light.
 
     Attributes
     ----------
     frames : tuple of Path or (h, w) array
-        Two or more.
+        Two or more frames.
     lit : bool
         False for frames in the dark.
     exposure_s, photons : float
@@ -62,11 +62,11 @@ class FrameSet:
     lights : tuple of LightFrames
         Flat frames and dark frames.
     white_dn : float
-        Greatest reading of the converter; NaN where raw files say it themselves.
+        Greatest reading of the converter; NaN if the raw files state it themselves.
     shape : (int, int)
-        Of frames without a head (.raw, .bin), which need it; (0, 0) where not told.
+        Height and width of files without a header (.raw, .bin), which need it; (0, 0) if it isn't known.
     notes : tuple of str
-        What was assumed of the files.
+        Notes on what was assumed about the files.
     """
 
     lights: tuple[LightFrames, ...]
@@ -77,7 +77,7 @@ class FrameSet:
 
 @dataclass(frozen=True)
 class Pixels:
-    """What a frame file holds: digital numbers, its mosaic, and the white level, NaN where it isn't told."""
+    """Content of a frame file: digital numbers, its mosaic, and the white level, which is NaN if it isn't known."""
 
     dn: NDArray[Any]
     cfa: Tile
@@ -199,7 +199,7 @@ def _read_index(path: Path) -> FrameSet:
 
 
 def _read_descriptor(path: Path) -> FrameSet:
-    """Read the reference sets' text: v release, n bits width height, b ns photons, d ns, i file."""
+    """Read a descriptor with the lines: v release, n bits width height, b ns photons, d ns, i file."""
     lights: list[LightFrames] = []
     bits = 0
     shape = (0, 0)
@@ -240,7 +240,7 @@ def _read_descriptor(path: Path) -> FrameSet:
 
 
 def _read_list(path: Path) -> FrameSet:
-    """Read a list: file, kind (flat or dark), exposure_s, and photons where they are known."""
+    """Read a list with the columns file, kind (flat or dark), exposure_s and, if known, photons."""
     rows = list(csv.DictReader(StringIO(_text(path))))
     head = tuple(rows[0]) if rows else ()
     if not set(LIST_HEAD[:3]) <= set(head):
@@ -263,7 +263,7 @@ def _read_list(path: Path) -> FrameSet:
 def white_level(pixels: Sequence[Pixels]) -> tuple[float, str]:
     """Return the white level of frames that don't state it, and a note.
 
-    It is the greatest number of the fewest bits that hold all readings.
+    It is the greatest number with as few bits as hold all readings.
     """
     most = max(float(np.max(one.dn)) for one in pixels)
     bits = max(int(most).bit_length(), 1)

@@ -1,4 +1,4 @@
-"""Raw files of flat and dark frames: read together, checked to belong together, and the pixel that they tell."""
+"""Measure a camera's pixel from raw files of flat and dark frames, which are checked to belong together."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

@@ -1,7 +1,7 @@
 """Measured responses of cameras by name: one of colour-science, and those of a copy of rawtoaces-data.
 
-That collection (Academy Software Foundation, Apache License 2.0) holds a JSON file a camera: relative response of R, G
-and B at 380-780 nm, 5 nm apart, with the name of its laboratory.
+That collection (Academy Software Foundation, Apache License 2.0) holds a JSON file per camera: the relative response of
+R, G and B at 380-780 nm, 5 nm apart, with the name of the laboratory.
 """
 
 import json
@@ -35,12 +35,12 @@ class MeasuredCamera:
     Attributes
     ----------
     maker, model, creator, laboratory, equipment, date : str
-        As the source has them; empty where it says nothing.
+        As the source states them; empty if it doesn't.
     source, licence : str
-        Of the collection.
+        Source and licence of the collection.
     wavelength_nm : (n,) float64
     per_power : mapping of str to (n,) float64
-        Response of each channel to equal radiant power, in a unit that all channels share where `balanced`.
+        Response of each channel to equal radiant power; if `balanced`, all channels share a unit.
     """
 
     maker: str

@@ -1,4 +1,4 @@
-"""Noise from what photographers have: a DNG's NoiseProfile."""
+"""Read a pixel's noise from a file that photographers have: a DNG with a NoiseProfile."""
 
 from math import sqrt
 from pathlib import Path

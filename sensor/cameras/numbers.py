@@ -12,10 +12,10 @@ from sensor.cfa import Tile, channels
 from sensor.config import SensorConfig
 from sensor.pixel import PixelConfig
 
-_STEP_NM = 4.0  # of lent curves
-_LEAST_SHARE = 0.05  # of the greatest response, at an anchor's wavelength
+_STEP_NM = 4.0  # step of curves that another camera lends
+_LEAST_SHARE = 0.05  # curves must reach this share of their maximum at the wavelength of a stated quantum efficiency
 NEEDED = ("pitch_um", "fill_factor", "full_well_e", "read_noise_e", "dsnu_e", "prnu")  # keys without a default
-_OFF = {  # by key, what is assumed of a term that no source states
+_OFF = {  # by key, what is assumed if no source states the term
     "dark_current_e_per_s": "no dark current",
     "column_gain_spread": "columns alike",
     "column_offset_e": "columns alike",
@@ -26,7 +26,7 @@ _OFF = {  # by key, what is assumed of a term that no source states
 
 @dataclass(frozen=True)
 class SourcedValue:
-    """A number, and on one line where it comes from."""
+    """A number, and its source on one line."""
 
     value: float
     source: str
@@ -34,20 +34,20 @@ class SourcedValue:
 
 @dataclass(frozen=True)
 class PixelNumbers:
-    """What one source tells of a camera.
+    """Numbers of a camera from one source.
 
     Attributes
     ----------
     source : str
         The source as a whole, on one line.
     pixel, settings : mapping of str to SourcedValue
-        By key of `PixelConfig`, and of `SensorConfig`: ``bits``, ``black_level_dn``.
+        Numbers by key of `PixelConfig`, and by key of `SensorConfig`: ``bits``, ``black_level_dn``.
     left_out : mapping of str to str
-        Why a key can't be told; a source without a word for a key says nothing of it.
+        For keys that the source can't state, the reason.
     efficiency : (float, float) or None
-        Electrons per photon at a wavelength [nm].
+        Electrons per photon, and the wavelength [nm] at which they were measured.
     cfa : tuple of str
-        Mosaic; empty where not told.
+        Mosaic; empty if the source doesn't state it.
     """
 
     source: str
@@ -60,16 +60,17 @@ class PixelNumbers:
 
 @dataclass(frozen=True)
 class Curves:
-    """Responses that a preset gets.
+    """Response curves for a preset.
 
     Attributes
     ----------
     name, source : str
-        Whose they are, and where they come from, on one line.
+        Name of the camera that has them, and their source on one line.
     curves : mapping of str to Spectrum
-        By channel, on one grid of wavelengths: relative per photon, the greatest 1; electrons per photon where lent.
+        Curves by channel, on one grid of wavelengths. A camera's own curves are relative, per photon, with the maximum
+        1. Curves that another camera lends are electrons per photon.
     note : str
-        What is known of the channels' ratios, or what was assumed.
+        What is known or assumed about the ratios between channels.
     lent_cfa : tuple of str
         Mosaic of the preset that lends the curves; empty for the camera's own curves.
     """

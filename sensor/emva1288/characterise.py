@@ -1,4 +1,4 @@
-"""What an EMVA 1288 laboratory reports of a chip, beside the configured values."""
+"""Measure a simulated chip as an EMVA 1288 laboratory does, and report the figures beside the configured values."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,13 +15,13 @@ from sensor.config import SensorConfig
 from sensor.emva1288 import estimators as emva
 from sensor.emva1288.photon_transfer import Expose, Transfer, dark_slopes, light_bench, take_stack, take_transfer
 
-# Under this variance [DN^2] rounding is no longer an added 1/12, and the standard gives an upper limit alone.
+# Below this variance [DN^2] rounding doesn't simply add 1/12, and the standard gives only an upper limit.
 LEAST_VARIANCE_DN2 = 0.24
 
 
 @dataclass(frozen=True)
 class ExposurePlan:
-    """What to expose: levels of light [e-], exposure time [s], frames of a stack, times of the dark series [s]."""
+    """Exposures to take: levels of light [e-], exposure time [s], frames per stack, times of the dark series [s]."""
 
     light_e: Floats
     exposure_s: float
@@ -54,7 +54,7 @@ class Characterisation:
     figures : tuple of FigureOfMerit
     transfer : Transfer
     dark_mean_dn, dark_variance_dn2, gain_dn_per_e, saturation_e : float
-        What the photon-transfer line rests on.
+        Dark mean and variance, slope and end of the photon-transfer line.
     linearity_share : (level,) float64
         Relative deviation of the mean from the fitted line; NaN beyond 5-95 % of saturation.
     notes : tuple of str
@@ -137,7 +137,7 @@ def plan_for(sensor: SensorConfig, exposure_s: float = 0.01) -> ExposurePlan:
     current = pixel.dark_current_e_per_s + pixel.hot_pixel_dark_current_e_per_s
     longest_s = min(0.3 * sensor.top_e / current, 1e6) if current else 1.0
     even = np.linspace(0, 1.1 * sensor.top_e, 56)[1:]
-    dim = np.geomspace(1e-4 * sensor.top_e, even[0], 8)[:-1]  # too dim to weigh in a fit: for the plot
+    dim = np.geomspace(1e-4 * sensor.top_e, even[0], 8)[:-1]  # for the plot; too dim to matter in a fit
     light_e = np.concatenate([dim, even])
     dark_times_s = tuple(np.linspace(0, longest_s, 6))
     return ExposurePlan(light_e=light_e, exposure_s=exposure_s, frames=32, dark_times_s=dark_times_s)

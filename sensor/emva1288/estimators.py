@@ -1,7 +1,7 @@
 """Estimators of EMVA Standard 1288 (release 4.0 Linear), each with its standard error.
 
-All take statistics in DN and give a value and the standard error of that value, which an exact count of draws predicts:
-nothing in them knows what was configured.
+All take statistics in DN, and return a value and its standard error, which follows from the number of draws. None of
+them uses a configured value.
 """
 
 from math import erfc, exp, hypot, inf, pi, sqrt
@@ -14,8 +14,8 @@ from rodcone.types import Floats
 from sensor.emva1288.photon_transfer import Stack, Transfer, column_variance, hot_pixels
 
 QUANTISATION_DN2 = 1 / 12  # variance that rounding adds, where the noise is wide enough
-FIT_SHARE = 0.7  # of saturation: the standard's range for the gain
-LINEAR_RANGE = (0.05, 0.95)  # of saturation: the standard's range for linearity
+FIT_SHARE = 0.7  # the standard fits the gain up to this share of saturation
+LINEAR_RANGE = (0.05, 0.95)  # the standard's range for linearity, in shares of saturation
 
 Estimate = tuple[float, float]
 

@@ -17,16 +17,16 @@ from sensor.cfa import Tile
 from sensor.emva1288.estimators import FIT_SHARE, QUANTISATION_DN2, Estimate
 
 NORMAL_95 = 1.959964  # standard errors to each side of a 95 % interval
-MOST_UNEVEN = 0.03  # of the mean, from the darkest block to the brightest, beyond what noise makes
-SAME_LIGHT = 0.02  # two frames whose means are nearer than this share of them were lit alike
-MOST_CLIPPED = 1e-3  # of a frame's pixels, at white or at 0
-LEAST_SIDE = 8  # pixels of each position, so that blocks and columns can be told apart
-LEAST_LIGHTS = 3  # from which a change of K over the range can be told
-SPREAD = (0.4, 0.6)  # of the range: one light is dimmer and one brighter, or the change would be extrapolated
-TOLD = 2.0  # standard errors from which a change of K is told from 0
-UNKNOWN_CHANGE = 0.05  # of K over the range, which is allowed for where the lights don't tell it
-_BLOCKS = 4  # a side, for the evenness
-_SURFACE_TERMS = 6  # of second order: 1, x, y, x^2, y^2, xy
+MOST_UNEVEN = 0.03  # largest difference between blocks of a flat frame beyond noise, as a share of the mean
+SAME_LIGHT = 0.02  # two frames whose means differ by less than this share were taken under the same light
+MOST_CLIPPED = 1e-3  # largest share of a frame's pixels at white or at 0
+LEAST_SIDE = 8  # least pixels of each position along a side, so that blocks and columns can be distinguished
+LEAST_LIGHTS = 3  # least number of lights from which a change of K over the range is computed
+SPREAD = (0.4, 0.6)  # shares of the range: one light must be dimmer, one brighter, so that nothing is extrapolated
+TOLD = 2.0  # a change of K is significant from this many standard errors on
+UNKNOWN_CHANGE = 0.05  # relative change of K over the range that is allowed for if the lights can't show it
+_BLOCKS = 4  # blocks along each side of a frame, to measure its evenness
+_SURFACE_TERMS = 6  # terms of a surface of second order: 1, x, y, x^2, y^2, xy
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,11 @@ class LightPoint:
     mean_dn, variance_dn2, error_dn2 : (position,) float64
         Mean, temporal variance, and the variance's standard error.
     dark_dn, dark_variance_dn2, dark_error_dn2 : (position,) float64
-        The same of the dark frames that belong to it.
+        The same for the dark frames that belong to this light.
     clipped : float
         Share of the pixels that read white.
     drift : float
-        From the darkest frame to the brightest, over the mean.
+        Difference between the brightest and the darkest frame, over the mean.
     """
 
     exposure_s: float
@@ -82,16 +82,15 @@ class LightPoint:
 
 @dataclass(frozen=True)
 class FrameFigures:
-    """What flat and dark frames tell of a camera.
+    """Figures of a camera that flat and dark frames give.
 
     Attributes
     ----------
     gain_dn_per_e, read_noise_e, dsnu_e, prnu : Interval
     gain_error : (float, float)
-        Standard errors of K over itself: by frames and the scatter of the lights, and by K's change over the range.
+        Two relative standard errors of K: by the frames and the scatter over lights, and by K's change over the range.
     gain_change, gain_change_error : float
-        Change of K over the standard's range, relative to K, and its standard error; NaN where the lights don't
-        tell it.
+        Change of K over the standard's range, relative to K, and its standard error; NaN if the lights can't show it.
     black_dn, white_dn : float
         Mean of the dark frames, and the reading of a full pixel.
     levels_dn : (level, position) float64
@@ -99,11 +98,11 @@ class FrameFigures:
     frames : tuple of int
         Flat frames of each stack, then dark frames.
     cfa : tuple of str
-        Their mosaic.
+        The frames' mosaic.
     points : tuple of LightPoint
         The photon transfer, from dim to bright.
     notes : tuple of str
-        What was assumed, and what a reader has to know of these frames.
+        Notes on what was assumed, and on what a reader has to know about these frames.
     """
 
     gain_dn_per_e: Interval
@@ -152,8 +151,8 @@ class Site:
 class SystemGain:
     """K with its two standard errors [DN/e-]: by frames and lights, and by its change over the range.
 
-    `change` is K's change over the range, relative to K, and `change_error` its standard error; NaN where the lights
-    don't tell it.
+    `change` is K's change over the range, relative to K, and `change_error` its standard error; NaN if the lights can't
+    show it.
     """
 
     value: float

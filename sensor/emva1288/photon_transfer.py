@@ -18,7 +18,7 @@ Expose: TypeAlias = Callable[[float, float], NDArray[np.uint16]]
 
 
 def light_bench(sensor: SensorConfig, shape: tuple[int, int], seed: int, exact: bool = False) -> Expose:
-    """Put one chip under uniform light that is set in electrons: the quantum efficiency is 1 by construction.
+    """Return a test bench: one chip under uniform light that is given in electrons, as with a quantum efficiency of 1.
 
     The electrons are those of a raw image's pixel: four that bin share them. Its frames are drawn as
     `sensor.capture.expose` draws them.

@@ -14,8 +14,8 @@ from rodcone.errors import require_range
 from rodcone.types import Floats
 from sensor.flicker.waveform import Waveform
 
-TOLERANCE = 0.1  # of the mean, within which light counts as steady: that program's default
-_EQUAL = 1e-9  # of the mean: a light that is steady to rounding
+TOLERANCE = 0.1  # light within this share of the mean counts as steady, by that program's default
+_EQUAL = 1e-9  # light within this share of the mean is steady, except for rounding
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,9 @@ from sensor.response import behind_filters, channel_electrons, expected_electron
 from sensor.shake import STEP_S, moved_by_rows, rolling_path, row_shares
 
 Parts = Sequence[tuple[Waveform, SpectralIrradiance]]  # lamps that flicker, and the light of each on the sensor
-_STEPS, _FINER = 16, 8  # of the hand's path in a lamp's period, at least; parts of each, for the lamp's light
-LONGEST_START_S = 1.0  # the mains run on: an exposure starts at any time of a second
+# Least steps of the hand's path in a lamp's period, and parts into which each step is divided for the lamp's light.
+_STEPS, _FINER = 16, 8
+LONGEST_START_S = 1.0  # the camera isn't synchronised to the mains: an exposure starts at a random time of a second
 
 
 def photograph_flickering(
@@ -40,9 +41,9 @@ def photograph_flickering(
     parts : sequence of (Waveform, SpectralIrradiance)
         Each lamp that flickers, and its part of `image`.
     sensor, exposure_s, device, rng, exact
-        As `sensor.capture.photograph_radiance` takes them.
+        As in `sensor.capture.photograph_radiance`.
     starts_s : sequence of float
-        When each frame's exposure starts, by the lamps' clock [s] (`frame_starts_s`).
+        Time at which each frame's exposure starts, by the lamps' clock [s] (`frame_starts_s`).
     """
     if sensor.lens.shake_um and exposure_s:
         channels_e = channel_electrons(image, sensor, exposure_s)
@@ -80,14 +81,14 @@ def held_under_lamps(
     Parameters
     ----------
     channels_e : (h, w, channel) float64
-        Of a still camera if every lamp gave its mean all the time.
+        Electrons behind every filter of a still camera, if every lamp gave its mean all the time.
     parts_e : sequence of (Waveform, (h, w, channel) float64)
-        Each lamp that flickers, and its part of these.
+        Each lamp that flickers, and its part of these electrons.
     sensor : SensorConfig
     exposure_s : float
         Above 0 [s].
     start_s : float
-        When the exposure of the first row starts, by the lamps' clock.
+        Time at which the exposure of the first row starts, by the lamps' clock.
     rng : numpy.random.Generator
         Gives one key for the path.
     """
@@ -97,7 +98,7 @@ def held_under_lamps(
     longest_s = min([STEP_S, *(lamp.period_s / _STEPS for lamp, _ in parts_e)])
     places, shares = rolling_path(starts_s, exposure_s, draw_key(rng), longest_s)
     places_px = places * (sensor.lens.shake_um / sensor.site_pitch_um)
-    # Of each fine place on the straight lines between two, its share of the light goes to both.
+    # The light at each fine place on the straight line between two steps is divided between these two.
     count = places.shape[1]
     fine = np.arange((count - 1) * _FINER + 1)
     step_s = (float(starts_s.max()) + exposure_s) / (fine.size - 1)
@@ -129,7 +130,7 @@ def frame_starts_s(
     ----------
     sensor : SensorConfig
     shape : (int, int)
-        Of its photodiodes.
+        Rows and columns of photodiodes.
     exposure_s : float
     rng : numpy.random.Generator
         Gives the first start: the camera isn't synchronised to the mains.

@@ -1,8 +1,8 @@
-"""Exposure row by row: when each row of a frame is exposed, and what it collects of lamps that flicker.
+"""Exposure row by row: when each row of a frame is exposed, and how much light of flickering lamps it collects.
 
 A lens and a mosaic are linear, and a lamp's flicker is the same for all that it lights. So a frame under lamps that
-flicker is the steady frame with the rows of each lamp's own part weighed by the lamp's mean light while they are
-exposed: nothing is rendered again.
+flicker is a sum over lamps of their parts of the steady frame, in which each row is multiplied by the lamp's mean light
+while that row is exposed. Nothing is rendered again.
 """
 
 from collections.abc import Iterable
@@ -18,7 +18,7 @@ from sensor.flicker.waveform import Waveform
 
 
 def check_flicker(sensor: SensorConfig, held: bool = False) -> None:
-    """Raise `InputError` for a camera that lamps which flicker aren't modelled for; `held` allows one that shakes."""
+    """Raise `InputError` for a camera for which flicker isn't modelled; with `held` a camera that shakes is allowed."""
     if reads_parts(sensor):
         raise InputError(
             "flicker: the camera reads some charge after a part of the time, which sees another part of the lamp's "
@@ -32,7 +32,7 @@ def check_flicker(sensor: SensorConfig, held: bool = False) -> None:
 
 
 def reads_parts(sensor: SensorConfig) -> bool:
-    """Return whether a camera reads some charge after a part of the exposure."""
+    """Return whether a camera reads some charge after only a part of the exposure time."""
     times = [x.time_share for x in sensor.chip.readings] + [x.time_share for x in sensor.chip.channels]
     return min(times, default=1.0) < 1 or any(x.metered for x in sensor.chip.channels)
 
@@ -46,10 +46,10 @@ def row_weights(waveform: Waveform, sensor: SensorConfig, rows: int, exposure_s:
     sensor : SensorConfig
         Its `row_time_us` is the delay between the starts of two rows; photodiodes that bin are exposed together.
     rows : int
-        Of photodiodes.
+        Number of rows of photodiodes.
     exposure_s : float
     start_s : float
-        When the exposure of the first row starts, by the lamp's clock.
+        Time at which the exposure of the first row starts, by the lamp's clock.
     """
     if exposure_s == 0:
         return np.ones(rows)
@@ -73,7 +73,7 @@ def flickering(
     parts : iterable of (Waveform, (h, w) float64)
         Each lamp that flickers, and its part of `steady_e`.
     sensor, exposure_s, start_s
-        As `row_weights` takes them.
+        As in `row_weights`.
     """
     result = np.array(steady_e, np.float64)
     for waveform, part_e in parts:
@@ -85,8 +85,8 @@ def flickering(
 def steady_exposure_s(waveforms: Iterable[Waveform], exposure_s: float) -> float:
     """Cut an exposure [s] to whole periods of the slowest lamp; leave one that is shorter than a period.
 
-    Every row then collects the same light; cameras call this anti-banding. Lamps whose periods don't divide that of the
-    slowest keep bands, though only these faster lamps do.
+    Every row then collects the same light of that lamp; cameras call this anti-banding. Faster lamps still make bands
+    if their periods don't divide the slowest lamp's.
     """
     slowest_s = max((x.period_s for x in waveforms), default=0.0)
     periods = floor(exposure_s / slowest_s + 1e-9) if slowest_s else 0

@@ -3,9 +3,9 @@
 A lamp on the mains brightens twice per cycle, so it flickers at 100 Hz or 120 Hz. How deeply depends on what stores
 energy between two peaks: a filament's heat, a phosphor's glow, nothing in a sodium arc. The depths below are the
 percent flicker, (most - least) / (most + least), of Lehman, Wilkins, Berman, Poplawski & Miller, "Proposing measures of
-flicker in the low frequencies for lighting applications" (IEEE ECCE 2011), who list it beside the flicker index of
-single lamps. They are entered as commonly quoted: the paper's own table was not at hand. A cosine of depth d has the
-index d / pi, which is theirs to 0.01, of the tube to 0.021.
+flicker in the low frequencies for lighting applications" (IEEE ECCE 2011), who also list the flicker index of single
+lamps. The numbers are as commonly quoted, because the paper's own table was not at hand. A cosine of depth d has the
+flicker index d / pi; it differs from theirs by at most 0.01, for the tube by 0.021.
 """
 
 import re

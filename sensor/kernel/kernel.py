@@ -1,4 +1,4 @@
-"""Expected electrons and the readout in Dr.Jit, one thread a pixel: one source for LLVM and CUDA.
+"""Expected electrons and the readout in Dr.Jit, with one thread per pixel and one source for LLVM and CUDA.
 
 Every number that changes between calls is an evaluated array of one value or more, so that one compiled kernel serves
 all cameras, keys and frame sizes (of one number of bands and channels). Draws depend on key, row, column and term
@@ -20,11 +20,11 @@ from sensor.pixel import bent_e
 from sensor.random import MULTIPLIERS, ROUNDS, WEYL, NoiseTerm
 from sensor.readout import convert, pixel_read_noise_e, row_noise_e, spread_charge, telegraph_noise_e
 
-BANDS_AT_ONCE = 8  # a CPU reads ahead in some dozen places; 40 at once take a third longer, and fight for its cache
+BANDS_AT_ONCE = 8  # a CPU prefetches about a dozen streams; 40 at once take a third longer, and compete for its cache
 LARGEST = np.finfo(np.float32).max
 # Bytes under which unaligned arrays are copied. Larger arrays of NumPy all lie alike, which costs one kernel more.
 COPY_UNDER = 1 << 20
-_FINITE_E = 1e30  # over any well; times any response in single precision's range
+_FINITE_E = 1e30  # larger than any well, and still in single precision's range when multiplied by any response
 
 
 # Expected electrons
@@ -128,9 +128,9 @@ def read_frame(
     key: int,
     reading: int = 0,
 ) -> NDArray[np.uint16]:
-    """Draw the digital numbers of one exposure: what `sensor.readout.draw_frame` does, with other random draws.
+    """Draw the digital numbers of one exposure, as `sensor.readout.draw_frame` does, but with other random numbers.
 
-    If the camera bins in charge, the wells are filled here, and NumPy converts the quarter as many pixels.
+    If the camera bins in charge, Dr.Jit fills the wells, and NumPy converts the sums, a quarter as many.
     """
     expected_e = np.asarray(expected_e, dtype=np.float32)
     jit = arrays()

@@ -1,12 +1,12 @@
-"""Poisson draws in Dr.Jit, one source for LLVM and CUDA: a table for small means, a quantile for large ones.
+"""Poisson draws in Dr.Jit, with one source for LLVM and CUDA: a table for small means, a quantile for large ones.
 
-Under `EXACT_BELOW_E` a draw is the sum of two independent ones that are Poisson themselves: the mean's whole part from
-an alias table (Walker, "An efficient method for generating discrete random variables", ACM TOMS 3, 1977), the rest by
-inversion, term by term in double precision. Its only error is that of 32-bit words: `TABLE_ERROR`.
+Below `EXACT_BELOW_E` a draw is the sum of two independent Poisson draws: one for the mean's whole part from
+an alias table (Walker, "An efficient method for generating discrete random variables", ACM TOMS 3, 1977), one for the
+rest by inversion, term by term in double precision. The only error is that of 32-bit words: `TABLE_ERROR`.
 
 From there on it is the quantile of a normal draw by the asymptotic series of Giles, "Algorithm 955: approximation of
-the inverse Poisson cumulative distribution function", ACM TOMS 42 (2016), Q_N2. Its largest error is at the foot of its
-range, and falls as 1 / mean^1.5: `LARGEST_ERROR`.
+the inverse Poisson cumulative distribution function", ACM TOMS 42 (2016), Q_N2. Its error is largest at the lower end
+of its range (`LARGEST_ERROR`), and falls as 1 / mean^1.5.
 """
 
 from functools import cache
@@ -18,11 +18,11 @@ from rodcone.jit import Double, Float, Mask, UInt, arrays, dr
 
 EXACT_BELOW_E = 30.0
 TABLE_ERROR = 2e-9  # largest error of a distribution function under 30 e-: 128 bins of 25-bit shares
-LARGEST_ERROR = 5e-6  # and from 30 e- on; 4.5e-6 at 30 e-, 3.7e-7 at 100 e-
+LARGEST_ERROR = 5e-6  # largest error of a distribution function from 30 e- on; 4.5e-6 at 30 e-, 3.7e-7 at 100 e-
 
-_BINS = 128  # the chance of more than 127 at a mean of 29 is 1e-39
-_SHARE_BITS = 25  # with the 7 bits of a bin they fill a word
-_MOST_TERMS = 40  # the chance of more at a mean under 1 is 1e-48; rounding could else keep the loop alive
+_BINS = 128  # the probability of more than 127 at a mean of 29 is 1e-39
+_SHARE_BITS = 25  # together with the 7 bits of a bin's number they fill a 32-bit word
+_MOST_TERMS = 40  # ends a loop that rounding could keep alive; more at a mean below 1 has a probability of 1e-48
 
 
 @cache
@@ -42,7 +42,11 @@ def alias_table() -> NDArray[np.uint32]:
 
 
 def _alias(heights: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
-    """Cut columns of mean height 1 into columns of height 1 that two numbers own: the first's share, and the second."""
+    """Cut columns with the mean height 1 into columns of height 1 with parts of at most two of the old ones.
+
+    A new column's first part comes from the old column with the same number. Return this part's share, and the number
+    of the other old column.
+    """
     share = np.ones(heights.size)
     other = np.arange(heights.size, dtype=np.uint32)
     heights = heights.copy()
@@ -89,7 +93,7 @@ def _by_table(mean_e: Float, words: tuple[UInt, UInt], table: UInt) -> Float:
 
 
 def _by_inversion(mean: Double, uniform: Double, active: Mask) -> Float:
-    """Draw from a Poisson law of mean under 1: the first number exceeded with a chance of at most `uniform`."""
+    """Draw from a Poisson law with a mean below 1: the first number whose excess has at most the chance `uniform`."""
     jit = arrays()
 
     def next_number(number: Double, chance: Double, exceeded: Double) -> tuple[Double, Double, Double]:

@@ -1,7 +1,7 @@
-"""Depth of field of a thin lens: what the disc on the sensor measures of a point that is out of focus.
+"""Depth of field of a thin lens: the diameter of the disc that a point out of focus becomes on the sensor.
 
-A lens of the focal length f, focused at the distance s, forms its image at v = f s / (s - f) behind it. Of a point at
-the distance d its pupil of the diameter f / N draws a disc of the diameter
+A lens with the focal length f, focused at the distance s, forms its image at v = f s / (s - f) behind it. A point at
+the distance d becomes a disc, because the lens's pupil has the diameter f / N. The disc's diameter is
 
     c = f^2 / N |d - s| / (d (s - f)),
 
@@ -19,9 +19,9 @@ def focal_length_of_view_mm(width_mm: float, view_deg: float, focus_m: float) ->
     Parameters
     ----------
     width_mm : float
-        Of the sensor.
+        Width of the sensor.
     view_deg : float
-        Across that width.
+        Angle of view across that width.
     focus_m : float
     """
     behind_mm = width_mm / 2 / tan(radians(view_deg / 2))
@@ -53,12 +53,12 @@ def circle_of_confusion_um(f_number: float, focal_length_mm: float, focus_m: flo
     focus_m : float
         Distance at which the lens is focused.
     distance_m : float
-        Of the point, above 0.
+        Distance of the point, above 0.
 
     Raises
     ------
     InputError
         For a distance of focus within the focal length.
     """
-    behind = focal_length_mm / (focus_m * 1e3 - focal_length_mm)  # image over object, in focus
+    behind = focal_length_mm / (focus_m * 1e3 - focal_length_mm)  # size of an image in focus over that of its object
     return 1e3 * pupil_mm(f_number, focal_length_mm, focus_m) * behind * abs(distance_m - focus_m) / distance_m

@@ -1,6 +1,6 @@
 """Relative illumination: how light falls off from the middle of a picture to its corners.
 
-Two causes multiply, and a third that a lens by data states (`sensor.lens.table`):
+Two factors multiply; a lens by data states a third one (`sensor.lens.table`):
 
 - natural falloff, a power of the cosine of the angle off the axis: 4 for a thin lens with its stop in it;
 - mechanical vignetting, a rim that cuts the pupil off the axis. Seen from a place at the image height h, 1 in the
@@ -29,7 +29,7 @@ from sensor.lens.table import lens_table
 EVEN_LIGHT: Mapping[str, Any] = MappingProxyType(
     {"horizontal_view_deg": 0.0, "falloff_power": 0.0, "vignetting": 0.0, "table": ""}
 )
-NATURAL_POWER = 4.0  # of a lens that states its angle of view alone
+NATURAL_POWER = 4.0  # falloff power of a lens that states only its angle of view
 
 
 def view_deg(lens: LensConfig, of_scene: float | None, term: str) -> float:
@@ -40,7 +40,7 @@ def view_deg(lens: LensConfig, of_scene: float | None, term: str) -> float:
     lens : LensConfig
     of_scene : float or None
     term : str
-        Of the lens, which needs the angle.
+        Name of the lens's term that needs the angle, for the error message.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def falloff(lens: LensConfig, shape: tuple[int, int], of_scene: float | None = N
     lens : LensConfig
     shape : (int, int)
     of_scene : float, optional
-        Angle of view of the scene's camera, which a lens with a `falloff_power` takes where it states none.
+        Angle of view of the scene's camera, for a lens with a `falloff_power` that states no angle.
 
     Raises
     ------
@@ -108,13 +108,13 @@ def pupil_share(height: Floats, lens: LensConfig) -> NDArray[np.float64]:
 def _shift(lens: LensConfig) -> float:
     """Return the distance k of the rim's centre from the pupil's, seen from the corners.
 
-    It is the one at which the corners lose the share of light that the lens states.
+    It is chosen so that the corners lose the share of light that the lens states.
     """
 
     def too_bright(shift: float) -> float:
         return float(_common_area(np.array([1.0]), shift, lens.vignetting_from)[0]) / np.pi - (1 - lens.vignetting)
 
-    # From here on the circles part.
+    # Beyond this shift the circles have no common area.
     return float(scipy.optimize.brentq(too_bright, 0.0, 2 / (1 - lens.vignetting_from), xtol=1e-12))
 
 

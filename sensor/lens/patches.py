@@ -1,9 +1,10 @@
-"""Light behind a lens by data: moved by distortion and lateral colour, and spread by each place's own point image.
+"""Light behind a lens by data: it is moved by distortion and lateral colour, and spread by point images.
 
-The picture is laid over with a grid of places, as close as the table's rings or closer. A point between four of them
-has the blend of their images by its distances, so that the windows of one place, two straight slopes along each
-axis, sum to 1. Each place's image is that of its image height, turned by its azimuth. Beyond the border the picture
-goes on as its mirror image, spread as at the border: an even wall stays even, and its like replaces what leaves.
+Point images are computed at a grid of places on the picture, as close as the table's rings or closer. Between four
+places their images are blended by distance: each place has a window, a tent along each axis, and the windows of all
+places sum to 1. The image at a place is that of its image height, turned by its azimuth. Beyond the border the picture
+continues as its mirror image, spread as at the border. So an even wall stays even, because light that leaves the
+picture is replaced by as much.
 """
 
 from collections.abc import Callable
@@ -18,7 +19,7 @@ from rodcone.types import Floats, Plane
 from sensor.lens.table import BEYOND, LensTable, Wavefronts
 from sensor.lens.wavefront import orders, reach_of, sampled_kernel
 
-LEAST_STEPS = 8  # of the grid from the middle to a corner; with 4 a blend's MTF is up to 0.02 off
+LEAST_STEPS = 8  # least steps of the grid from the middle to a corner; with 4 a blend's MTF is off by up to 0.02
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Patch:
         Image height, 1 in the corners, and angle from the rows' direction towards the columns' [radians].
     rows, columns : slice
     window : array
-        Of the part's shape.
+        Weight of the place at each sample of the part.
     """
 
     height: float
@@ -42,7 +43,7 @@ class Patch:
 
 
 def patches(shape: tuple[int, int], rings: int, beyond: int = 0) -> tuple[Patch, ...]:
-    """Lay a grid over a picture; the windows of all places sum to 1 at each sample.
+    """Return the places of a grid over a picture; the windows of all places sum to 1 at each sample.
 
     `beyond` samples at each side of the picture belong to the border's places; slices count from the first of them.
     """
@@ -86,11 +87,11 @@ def spreader(
     table : LensTable
         With a point spread.
     shape : (int, int)
-        Of the samples.
+        Rows and columns of samples.
     step_um : float
-        Between samples.
+        Distance between samples.
     folded : bool
-        As of `sensor.diffraction.sampled_otf`.
+        As in `sensor.diffraction.sampled_otf`.
     threads : int
     """
     reach = reach_of(table, table.wavelength_nm, step_um)
@@ -139,7 +140,7 @@ def _turned(kernel: Floats, down: bool, over: bool) -> Floats:
 
 
 def mover(table: LensTable, shape: tuple[int, int], step_um: float) -> Callable[[Plane, float], Plane]:
-    """Return a function of light and wavelength that moves light to where distortion and lateral colour let it land.
+    """Return a function of light and wavelength that moves light by distortion and lateral colour.
 
     Between samples the light is a cubic spline, cut off at 0 unless some of the light is negative. Beyond the border
     the picture continues as its mirror image.
@@ -148,9 +149,9 @@ def mover(table: LensTable, shape: tuple[int, int], step_um: float) -> Callable[
     ----------
     table : LensTable
     shape : (int, int)
-        Of the samples.
+        Rows and columns of samples.
     step_um : float
-        Between samples.
+        Distance between samples.
     """
     middle = [(side - 1) / 2 for side in shape]
     rows, columns = (np.arange(side) - half for side, half in zip(shape, middle, strict=True))
@@ -163,7 +164,7 @@ def mover(table: LensTable, shape: tuple[int, int], step_um: float) -> Callable[
         if np.array_equal(landing, ideal):
             return light
         landing = np.maximum.accumulate(landing)
-        # Of a place on the sensor, the ideal place over it.
+        # For each sample, the image height that its light would have with an ideal lens, over the sample's own height.
         share = np.interp(heights, landing, ideal) / np.maximum(heights, 1e-12)
         share = np.where(heights < 1e-12, 0.0, share)
         at = [rows[:, None] * share + middle[0], columns * share + middle[1]]

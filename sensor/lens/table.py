@@ -36,12 +36,12 @@ from sensor.config import LensConfig, SensorConfig
 
 SHIPPED = Path(__file__).parent / "data"
 MOST_BYTES = 1 << 24  # 9 rings of 7 wavelengths with kernels of 64 x 64 points take 8 MB
-MOST_NOLL = 66  # up to the tenth order
+MOST_NOLL = 66  # largest of Noll's numbers, up to the tenth order
 BEYOND = 1.25  # largest image height from which distortion may bring light into the picture
 PLACE = ("field", "wavelength_nm")
 PUPIL = ("pupil_radial", "pupil_across")
 POINTS = ("radial_um", "across_um", "energy")
-_LEAST_STEP_UM, _MOST_POINTS = 1e-3, 257  # of a kernel, and along each of its sides
+_LEAST_STEP_UM, _MOST_POINTS = 1e-3, 257  # least step of a kernel, and most points along each of its sides
 _FIX = "see the file of a shipped lens, such as sensor/lens/data/cooke_triplet.toml"
 
 
@@ -89,7 +89,7 @@ class LensTable:
     field : (field,) float64
         From 0 to 1, rising.
     wavelength_nm : (wavelength,) float64
-        Rising; beyond its ends the nearest counts.
+        Rising wavelengths; outside their range the nearest one is used.
     relative_illumination, distortion : (field,) float64
     lateral_um : (wavelength, field) float64
         How much farther out than the undispersed image a wavelength lands.
@@ -256,12 +256,12 @@ def read_lens(lens: str) -> LensTable:
     Parameters
     ----------
     lens : str
-        A shipped one's name, or a TOML file.
+        Name of a shipped lens, or a TOML file.
 
     Raises
     ------
     InputError
-        For a file that can't be read, or what no lens has: negative energy, gaps, nodes that don't rise.
+        For a file that can't be read, or values that no lens has: negative energy, gaps, nodes that don't rise.
     """
     path = lens_file(lens)
     given = _given(path, _stamp(path))

@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from rodcone.types import Floats
 from sensor.lens.table import Kernels, LensTable, Wavefronts
 
-LEAST_ACROSS = 64  # places across the pupil, at least
+LEAST_ACROSS = 64  # least number of sampling points across the pupil
 _HARD = 1e-9  # width of a rim that isn't softened
-MOST_KEPT = 1024  # images of points, of 20 bands and some 50 places; at 2 um 60 MB
-_PAD = 4  # zeros around a kernel, over its side, so that its transform is smooth
+MOST_KEPT = 1024  # cached images of points: enough for 20 bands and some 50 places; 60 MB at 2 um
+_PAD = 4  # a kernel is padded with zeros to this many times its side, so that its transform is smooth
 
 
 def orders(noll: int) -> tuple[int, int]:
@@ -154,7 +154,7 @@ def reach_of(table: LensTable, nm: Floats, step_um: float) -> int:
     return int(scipy.fft.next_fast_len(least))
 
 
-@lru_cache(maxsize=MOST_KEPT)  # four fifths of a picture's time, and a capture forms three images
+@lru_cache(maxsize=MOST_KEPT)  # they take four fifths of a picture's time, and a capture needs them three times
 def sampled_kernel(
     table: LensTable, height: float, azimuth: float, wavelength_nm: float, step_um: float, reach: int, folded: bool
 ) -> Floats:
@@ -173,7 +173,7 @@ def sampled_kernel(
         Angle of the radius from the rows' direction, downwards, towards the columns' [radians].
     wavelength_nm, step_um : float
     reach : int
-        Of `reach_of`.
+        Samples on each side of the point, from `reach_of`.
     folded : bool
     """
     cosine, sine = np.cos(azimuth), np.sin(azimuth)

@@ -8,8 +8,8 @@ from rodcone.errors import InputError
 from sensor.cfa import mask
 from sensor.raw import RawImage, channel_variance
 
-MOST_NOISE = 0.1  # of the level that is shown as white: the cells of the mean grow until their noise is under it
-LEAST_CELLS = 256  # that a percentile is taken of
+MOST_NOISE = 0.1  # cells are enlarged until the noise of their means is below this share of the level shown as white
+LEAST_CELLS = 256  # least number of cells for a percentile
 
 
 def stops_to_white(raw: RawImage) -> float:

@@ -47,7 +47,7 @@ OPCODES = 51008  # OpcodeList1: what is done to the samples as read
 EXPOSURE_TIME, F_NUMBER, ISO = 33434, 33437, 34855
 BASELINE_EXPOSURE, IMAGE_NUMBER = 50730, 37393
 LEAST_BYTES = 100_000  # RawTherapee 5.9 takes no smaller file for a raw one
-CROPPED_PX = 2  # on each side: Adobe's DNG SDK warns of less for interpolation
+CROPPED_PX = 2  # pixels cropped on each side for interpolation; Adobe's DNG SDK warns of fewer
 _COMPARED = {
     CFA_REPEAT: "CFARepeatPatternDim",
     CFA_PATTERN: "CFAPattern",
@@ -58,10 +58,10 @@ _COMPARED = {
     F_NUMBER: "FNumber",
     ISO: "PhotographicSensitivity",
 }
-_NEAR = {EXPOSURE_TIME: 0.1, F_NUMBER: 0.05}  # to which Adobe's writer rounds them: times and stops marked on cameras
+_NEAR = {EXPOSURE_TIME: 0.1, F_NUMBER: 0.05}  # relative differences: Adobe's writer rounds to values marked on cameras
 _COLOURS = {"R": 0, "G": 1, "B": 2, "W": 6}  # numbers of CFAPattern and CFAPlaneColor; 6 is white
 _ILLUMINANT_A, _ILLUMINANT_D65 = 17, 21  # EXIF LightSource
-_LARGEST = 2**31 - 1  # of a rational's numerator and denominator
+_LARGEST = 2**31 - 1  # largest numerator and denominator of a rational
 
 
 def write_dng(raw: RawImage, path: Path, *, frame: int | None = None, written: datetime | None = None) -> Path:

@@ -1,4 +1,4 @@
-"""Where black, white and colours of a digital negative lie, by its own tags, and not as a library moves them.
+"""Read black level, white level and colours of a digital negative from its own tags, without a library's changes.
 
 Tags and their meaning: Adobe, "Digital Negative (DNG) Specification", version 1.6.0.0, chapters 4 to 7. The patterns of
 black and of the colours begin at the first row and column of the active area.
@@ -57,7 +57,7 @@ _COLOURS = "RGBCMYW"  # by number of CFAPattern
 
 @dataclass(frozen=True)
 class DngLevels:
-    """What a digital negative says of its samples.
+    """Levels and colours of a digital negative's samples.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class DngLevels:
     black_dn : (h, w) float64
         Black level of each sample in the area [DN].
     white_dn : float or None
-        None where the file leaves it to the reader.
+        White level; None if the file doesn't state it.
     """
 
     area: tuple[slice, slice]

@@ -1,4 +1,4 @@
-"""A camera's gain and dark noise from one photograph, where its file doesn't tell them."""
+"""Estimate a camera's gain and dark noise from one photograph whose file doesn't state them."""
 
 from dataclasses import dataclass
 
@@ -6,11 +6,11 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-_BINS = 24  # of brightness
-_SMOOTHEST = 0.2  # share of a bin's blocks that is used
-_LEAST_BLOCKS = 100  # used in a bin: the median's standard error is then about 12 %, of the variance 24 %
+_BINS = 24  # number of bins of brightness
+_SMOOTHEST = 0.2  # share of a bin's blocks that is used: those with the least structure around them
+_LEAST_BLOCKS = 100  # least blocks used in a bin: the median's standard error is then about 12 %, the variance's 24 %
 _LEAST_BINS = 4
-_MAD_TO_SIGMA = 1.4826  # of a normal variable: 1 / Phi^-1(3/4)
+_MAD_TO_SIGMA = 1.4826  # standard deviation of a normal variable over its median deviation, 1 / Phi^-1(3/4)
 
 
 @dataclass(frozen=True)

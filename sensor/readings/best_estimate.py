@@ -23,8 +23,8 @@ from sensor.readings.resolve import PlainReading
 # A reading, or a frame of a burst, counts where the merged light stays 6 standard deviations below its full well: noise
 # then clips it in one of 1e9 pixels.
 CLEAR_SIGMAS = 6.0
-_ROUNDS = 6  # in which the weights are refined, as in `sensor.burst`
-_WEIGHT_LEVELS = 512  # of light at which weights are computed; between them they are interpolated
+_ROUNDS = 6  # rounds in which the weights are refined, as in `sensor.burst`
+_WEIGHT_LEVELS = 512  # levels of light at which weights are computed; between them they are interpolated
 # A large frame's variance is computed at this many levels of light, 0.3 % apart, and interpolated between them.
 _VARIANCE_LEVELS = 8192
 
@@ -46,7 +46,7 @@ class Seams:
 
 
 def shares(readings: Sequence[PlainReading]) -> Floats:
-    """Return the share of the whole pixel's electrons of the whole exposure that each reading holds."""
+    """Return for each reading its share of the electrons that the whole pixel collects in the whole exposure."""
     return np.array([x.share for x in readings])
 
 

@@ -1,17 +1,17 @@
 """Mean and variance of samples that the well and the converter clip, in closed form.
 
-Counted electrons n are taken as Gaussian. They clip at the well, noise e of reading comes on top, and the converter
-clips the sum: min(min(n, well) + e, top). For a given e that is min(n, c) + e with c = min(well, top - e), a Gaussian
-censored at c, whose moments are
+Counted electrons n are assumed to be Gaussian. They clip at the well, the noise e of reading is added, and the
+converter clips the sum: min(min(n, well) + e, top). For a given e that is min(n, c) + e with c = min(well, top - e), a
+Gaussian censored at c, whose moments are
 
     z = (c - mean) / sigma,    E[min(n, c)] = mean + sigma (z (1 - P(z)) - p(z)),
     E[(min(n, c) - mean)^2] = sigma^2 (P(z) - z p(z) + z^2 (1 - P(z))),
 
-P and p the normal distribution and density (Tobin 1958). Over e they are integrated by Gauss and Legendre, on either
-side of the e at which converter and well change places. Poisson's skewness is left out: of a well of 6000 e- it takes
-1 % from the variance at the well, 6 % where the mean is three deviations over it. Under black, where the converter ends
-at 0 DN, counted electrons and noise of reading are one Gaussian censored from below. Photodiodes that bin are taken for
-one pixel of their sum.
+where P and p are the normal distribution and density (Tobin 1958). They are integrated over e by Gauss-Legendre
+quadrature, on either side of the e above which the converter clips before the well does. Poisson's skewness is left
+out: for a well of 6000 e- it lowers the variance by 1 % at the well, and by 6 % if the mean is three standard
+deviations above it. Below black, where the converter ends at 0 DN, counted electrons and noise of reading together are
+one Gaussian, censored from below. Photodiodes that bin are treated as one pixel with their sum.
 """
 
 from collections.abc import Sequence
@@ -25,8 +25,8 @@ from sensor.cfa import mask
 from sensor.pixel import bent_e, bent_slope
 from sensor.readings.resolve import PlainReading
 
-FAR = 7.0  # standard deviations; a sample farther from a bound never clips there
-LOW = 4.9  # the same for black: the default black level is five deviations high and clips nothing
+FAR = 7.0  # a sample more than this many standard deviations from a bound never clips there
+LOW = 4.9  # the same for black: the default black level is five standard deviations high and clips nothing
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
@@ -37,11 +37,11 @@ class Moments:
     Attributes
     ----------
     mean_e : array
-        Above the mean of dark current and hot pixels [e-]: the light where nothing clips.
+        Mean less that of dark current and hot pixels [e-]; it is the light where nothing clips.
     variance_e2 : array
-        Over chips and exposures [e-^2].
+        Variance over chips and exposures [e-^2].
     slope : array
-        Of the mean by the light: 1 where nothing clips, 0 where all does.
+        Derivative of the mean by the light: 1 where nothing clips, 0 where everything does.
     """
 
     mean_e: Floats

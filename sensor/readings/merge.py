@@ -27,7 +27,7 @@ def merge(readings: Sequence[PlainReading], raws: Sequence[RawImage]) -> RawImag
     ----------
     readings : sequence of PlainReading
     raws : sequence of RawImage
-        What each of them read.
+        Raw image of each reading.
     """
     pixel, exposure_s = readings[0].pixel, readings[0].exposure_s
     whole = collected_share(readings)

@@ -1,12 +1,12 @@
 """Resolve a camera for one exposure into the plain readings of which its raw image is made.
 
-A plain reading is a camera that reads every pixel once, and what its samples stand for. A camera without several
-readings is a tuple of one, and so is one that bins. Of a pixel that is read at several gains, times or photodiodes each
-is a plain reading of all pixels. Of channels that are read apart, after a time of their own, behind a neutral density
-or at another conversion gain, each is a plain reading of that channel's sites.
+A plain reading describes a camera that reads every pixel once, and how its samples are scaled. A camera that reads each
+pixel once has one plain reading, and so has one that bins. If a pixel is read several times, with other gains, times or
+photodiodes, each of these is a plain reading of all pixels. If a channel has an exposure time, a neutral density or a
+conversion gain of its own, it is a plain reading of that channel's sites.
 
-The raw image holds all in one unit: e electrons are what a pixel would collect of its whole light in the whole time.
-A reading that takes the share s of it counts s e electrons, of which everything that a pixel does is said; over s,
+The raw image holds all in one unit: the electrons e that a pixel would collect of its whole light in the whole time. A
+reading that collects the share s of them counts s e electrons, and the pixel's numbers hold for these. Divided by s,
 their shot noise has the variance e / s, and their well and dark noise are 1 / s times as large.
 """
 
@@ -37,23 +37,23 @@ class PlainReading:
     Attributes
     ----------
     sensor : SensorConfig
-        A camera all of whose pixels are read once, in electrons of this reading's own.
+        A camera that reads every pixel once, with numbers in the reading's own electrons.
     exposure_s : float
-        The whole time [s]; the sensor's dark current is that of the reading's share of it.
+        The whole exposure time [s]. The sensor's dark current is scaled to the reading's share of it.
     pixel : PixelConfig
-        Of the raw image, in its electrons.
+        Pixel of the raw image, with numbers in the raw image's electrons.
     light_share : float
-        Share of a pixel's light that the photodiode, or the density in front of it, takes.
+        Share of a pixel's light that the photodiode collects, or that the density in front of it lets through.
     time_share : float
-        Share of the whole time after which it is read.
+        Share of the whole time after which the charge is read.
     photodiode : str
-        Which one: readings of another have other shot noise and another PRNU.
+        Name of the photodiode; readings of different photodiodes have their own shot noise and PRNU.
     sites : str or None
-        Channels at whose sites the raw image holds this reading; None where it reads every pixel.
+        Channels at whose sites the raw image holds this reading; None if it reads every pixel.
     patterns : int or None
-        Its number among `sensor.device.Device.readings`; None of a chip with one set of patterns.
+        Index among `sensor.device.Device.readings`; None for a chip with one set of patterns.
     poisson : float
-        Variance of the counted electrons over their mean: 0 of `sensor.readout.draw_mean_frame`.
+        Variance of the counted electrons over their mean: 1, or 0 for `sensor.readout.draw_mean_frame`.
     """
 
     sensor: SensorConfig
@@ -211,7 +211,7 @@ def resolve(
     exposure_s : float
         The whole time [s].
     channel : str, optional
-        Channel of all of them, whose readings alone are returned, as if they read every pixel.
+        Channel to which all of `expected_e` belong. Only its readings are returned, as if they read every pixel.
     """
     chip = sensor.chip
     if chip.channels and channel is None and expected_e.ndim < 2:
