@@ -28,7 +28,7 @@ _NAMES = (
     "still_life_outdoor",
     "walker",
 )
-DRAWN = ("diorama", "generated")  # from a number, in hexadecimal after a dash
+DRAWN = ("diorama", "generated")  # scenes drawn at random from a seed, which is written in hexadecimal after a dash
 _DRAWN = re.compile(f"({'|'.join(DRAWN)})-([0-9a-f]{{1,40}})")
 
 
@@ -50,7 +50,7 @@ def load(name: str, **options: object) -> Scene:
     Parameters
     ----------
     name : str
-        One of `names()`; ``generated-1f3a`` is `scenes.generated.generated` with that seed, in hexadecimal, and
+        One of `scene_names()`; ``generated-1f3a`` is `scenes.generated.generated` with that seed, in hexadecimal, and
         ``diorama-1f3a`` is `scenes.diorama.diorama`.
     **options
         The builder's own parameters, such as ``light="A"``.

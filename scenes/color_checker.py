@@ -18,7 +18,7 @@ from scenes.reflectances import grey, held, read_reflectances
 PATCH_M, GAP_M = 0.040, 0.005  # the classic chart's 40 mm patches
 COLUMNS, ROWS = 6, 4
 BOARD = 0.04  # reflectance of the board between the patches: the chart's black frame
-CHART_SIZE = 170, 256  # 3:2, as the chart: a square picture cuts a seventh off its first and last column
+CHART_SIZE = 170, 256  # 3:2, like the chart; a square picture would cut off a seventh of its first and last column
 FACING = look_at((0, 0, 0), (0, 0, 1))  # towards the camera
 
 
@@ -50,7 +50,10 @@ def color_checker(light: str = "D65", surround: float = 0.2, chart: str | None =
 
 
 def chart_scene(name: str, curves: Sequence[Spectrum], surround: Spectrum, light: str) -> Scene:
-    """Make a scene of a chart of up to 24 reflectances on a card, all on one grid, in a constant environment."""
+    """Make a scene of a chart of up to 24 reflectances on a card, in a constant environment.
+
+    All reflectances should have the same wavelengths, so that the scene compiles quickly.
+    """
     view = camera(20.0, (0, 0, 0.72), (0, 0, 0), CHART_SIZE)
     scene = under_sky(name, view, {"card": panel(FACING, 4.0, 4.0, matte(surround))}, light, reference_plane="card")
     board = Spectrum(surround.wavelength_nm, np.full(surround.values.shape, BOARD))

@@ -1,7 +1,7 @@
 """Contrast patches: pairs of greys of known contrast and luminance, by which IEEE 2020 measures contrast accuracy.
 
-Each pair is a bright and a dark square side by side. Their Michelson contrast, (a - b) / (a + b), is the column's, and
-their mean reflectance the row's. On grey card, in a picture that the chart fills.
+Each pair is a bright and a dark square side by side. Pairs in the same column have the same Michelson contrast,
+(a - b) / (a + b), and pairs in the same row the same mean reflectance. The chart is on grey card and fills the picture.
 """
 
 from dataclasses import dataclass
@@ -13,17 +13,17 @@ from render.scene import Scene
 from scenes.materials import matte, panel, under_sky
 from scenes.reflectances import grey
 
-CONTRASTS = (0.1, 0.2, 0.4)  # of Michelson, left to right
+CONTRASTS = (0.1, 0.2, 0.4)  # Michelson contrasts of the columns, left to right
 MEANS = (0.5, 0.125, 0.03125, 0.0078125)  # reflectances, from the top down: two stops apart
 GROUND = 0.18
-SIDE_M = 0.5  # of the picture
+SIDE_M = 0.5  # side of the picture
 PATCH_M = 0.07  # side of a patch
-PAIR_M, ROW_M = 0.16, 0.12  # from pair to pair, and from row to row
+PAIR_M, ROW_M = 0.16, 0.12  # distance from pair to pair, and from row to row
 
 
 @dataclass(frozen=True)
 class PatchPair:
-    """Two patches, by reflectance and by the middle and the side of each in shares of the picture's side.
+    """Two patches: their reflectances, and their middles and side as shares of the picture's side.
 
     Attributes
     ----------

@@ -13,7 +13,7 @@ from render.spectrum import Spectrum
 from scenes.materials import block, floor, matte, panel
 from scenes.reflectances import resampled
 
-LAMP_LUMINANCE_CD_M2 = 10_000.0  # a fluorescent tube's (IES Lighting Handbook); the data gives the shape alone
+LAMP_LUMINANCE_CD_M2 = 10_000.0  # that of a fluorescent tube (IES Lighting Handbook); the data states no luminance
 # Inner size. The published floor and left wall are out of square by up to 6 mm; here they are squared up.
 WIDTH_M, HEIGHT_M, DEPTH_M = 0.5560, 0.5488, 0.5592
 CAMERA_FOV_DEG = 2 * np.degrees(np.arctan(0.025 / 2 / 0.035))  # film of 25 mm behind a lens of 35 mm
@@ -45,7 +45,7 @@ def cornell_box(light: str | None = None) -> Scene:
     left = look_at((WIDTH_M, y, z), (0, y, z))  # the picture's left: x grows to the left of a camera that looks at +z
     right = look_at((0, y, z), (WIDTH_M, y, z))
     down = rotate((1, 0, 0), 90)
-    # Middle, turn and mean edge of the blocks' published corners.
+    # Middle, rotation and mean edge of each block, from its published corners.
     short = translate(0.1855, 0, 0.169) @ rotate((0, 1, 0), -16.6)
     tall = translate(0.3685, 0, 0.35125) @ rotate((0, 1, 0), 17.2)
     lamp = translate(0.278, HEIGHT_M - 0.0005, 0.2795) @ down

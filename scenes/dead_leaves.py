@@ -1,7 +1,7 @@
-"""Dead leaves: a chart of overlapping disks whose spectrum is known, as ISO/TS 19567-2 measures texture by one.
+"""Dead leaves: a chart of overlapping disks with a known spectrum, such as ISO/TS 19567-2 uses to measure texture.
 
-Disks of radii with a density in proportion to r^-3, between two limits, fall on one another, each of a grey of its own.
-Two points at a distance d see the same disk with the probability
+Disks fall on one another, each with a grey of its own. Their radii lie between two limits, with a density proportional
+to r^-3. Two points at a distance d see the same disk with the probability
 
     g(d) / (2 g(0) - g(d)),    g(d) the mean area in which a disk and itself moved by d overlap
 
@@ -19,11 +19,11 @@ from rodcone.types import Floats, Plane
 from scenes.materials import mixed, panel, under_sky
 from scenes.reflectances import grey
 
-LEAST_PX, MOST_PX = 1.0, 24.0  # radii, in pixels of a picture or in units of the scene's chart
-DARKEST, BRIGHTEST = 0.05, 0.95  # reflectances, evenly spread
-LAYERS = 5.0  # of disks: exp(-5) of the chart shows the ground, which has the mean grey
-SIDE, SQUARES = 256, 4  # of the scene's chart: units along a side, and squares along a unit
-SIDE_M = 0.5  # of the scene's chart, which fills a square picture
+LEAST_PX, MOST_PX = 1.0, 24.0  # limits of the radii, in pixels of a picture or in units of the scene's chart
+DARKEST, BRIGHTEST = 0.05, 0.95  # limits of the reflectances, which are uniformly distributed
+LAYERS = 5.0  # mean number of disks over a point: exp(-5) of the chart shows the ground, which has the mean grey
+SIDE, SQUARES = 256, 4  # units along a side of the scene's chart, and squares along a unit
+SIDE_M = 0.5  # side of the scene's chart, which fills a square picture
 
 
 def dead_leaves(seed: int = 0, light: str = "D65") -> Scene:
@@ -35,7 +35,7 @@ def dead_leaves(seed: int = 0, light: str = "D65") -> Scene:
     Parameters
     ----------
     seed : int
-        Of the disks.
+        Seed of the disks.
     light : str
         Illuminant of the sky, whose luminance is 100 cd/m^2.
     """

@@ -22,7 +22,8 @@ PICTURES_LICENCE = "scikit-image's pictures are CC0 or public domain, its coins 
 TILES = ("brick", "grass", "gravel")
 PRINTS = ("camera", "coins", "horse", "text")
 LAMPS = ("A", "F2", "F11", "LED-B1", "LED-B3", "LED-B5", "LED-RGB1", "LED-V1", "sodium_high")
-KELVIN = {"day": (5500, 9000), "dusk": (8000, 20000), "night": (4100, 6000)}  # of daylight, between two bounds
+# Least and greatest colour temperature of daylight [K].
+KELVIN = {"day": (5500, 9000), "dusk": (8000, 20000), "night": (4100, 6000)}
 SKY_LUX = {"day": (6e3, 2e4), "dusk": (5, 40), "night": (0.1, 1)}
 WINDOW_CD_M2 = {"day": (1500, 4000), "dusk": (20, 100)}
 SUN_RADIUS_DEG, SUN_DISTANCE_M = 0.27, 400.0
@@ -34,10 +35,10 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True)
 class _Stage:
-    """What things stand on and are seen from, with places for lamps.
+    """Ground on which things stand, the camera's view of it, and places for lamps.
 
-    `cells` are the middles of the ground's cells [m], `unit_m` the size of things in them, `window` the pose of an
-    opening for daylight of `window_m`, None under the open sky.
+    `cells` are the middles of the ground's cells [m], `unit_m` is the size of things in them. `window` is the pose of
+    an opening for daylight, None under the open sky, and `window_m` its size.
     """
 
     nodes: Nodes

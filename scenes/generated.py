@@ -1,4 +1,4 @@
-"""A scene drawn at random from a number: things, colours, textures and light that no setting was chosen on."""
+"""A scene drawn at random from a number: things, colours, textures and light for which no setting was tuned."""
 
 from math import cos, radians, sin
 
@@ -14,19 +14,19 @@ from scenes.reflectances import band, edge, grey
 
 LIGHTS = ("D65", "A", "LED-B3", "FL11")
 LIGHT_LUMINANCE_CD_M2 = 1000.0
-LEAVES = 90  # on the wall, one before the other
-LARGEST_SEED = 2**160 - 1  # that of a SHA-1
+LEAVES = 90  # number of leaves on the wall, which overlap
+LARGEST_SEED = 2**160 - 1  # the largest SHA-1
 
 
 def generated(seed: int = 0, light: str | None = None) -> Scene:
-    """Build a table before a wall of overlapping leaves, all drawn from `seed`, lit by one softbox (group ``softbox``).
+    """Build a table in front of a wall of overlapping leaves, all drawn from `seed`, lit by one softbox (``softbox``).
 
     Parameters
     ----------
     seed : int
         0 to 2^160 - 1, such as a commit's hash: nobody chose it.
     light : str, optional
-        Illuminant of the softbox; drawn where left out.
+        Illuminant of the softbox; left out, it is drawn too.
 
     Raises
     ------

@@ -14,8 +14,8 @@ from scenes.reflectances import band, edge, grey
 
 # Below 0.005 cd/m^2 vision is scotopic, above 5 photopic (CIE 191:2010); 25 cd/m^2 is the paper's Table 1.
 DARK_CD_M2, LIT_CD_M2 = 0.002, 25.0
-# Mean luminance of a half of the picture over that of its lamps: rendered once with 40 bands, max_depth 8, to 0.2 %.
-# The two differ by the colours of the lights.
+# Mean luminance of each half of the picture over that of its lamps, rendered once with 40 bands and max_depth 8, within
+# 0.2 %. The two halves differ because their lights have different colours.
 NIGHT_HALF_PER_LAMP, LAMP_HALF_PER_LAMP = 0.00587, 0.00582
 WIDTH_M, HEIGHT_M, DEPTH_M, BOARD_M = 0.58, 1.16, 0.45, 0.02  # inside of each half; thickness of its boards
 SHELF_M = 0.50

@@ -15,8 +15,8 @@ TWINS_UNDER = "D65"
 OTHER_LIGHT = "A"  # the light under which the two of a pair are made to differ most
 PAIRS = 12
 LOW, HIGH = 0.02, 0.95  # range of the made reflectances: soot to white paper
-SHARE = 0.5  # at most this much of a base's room is used, so that the curves stay like dyes'
-BUMP_NM = 30.0  # standard deviation of the bumps that a difference is made of: dyes' bands are no narrower
+SHARE = 0.5  # a curve goes at most this share of the way from its base to `LOW` or `HIGH`, as curves of dyes do
+BUMP_NM = 30.0  # standard deviation of the bumps in a difference; the bands of dyes are no narrower
 # Bases by their index in the ColorChecker: muted colours, which leave room on both sides.
 _BASES = (0, 1, 2, 4, 5, 9, 19, 20, 21, 7, 3, 10)
 
@@ -55,8 +55,8 @@ def _pair(nm: Floats, base: Floats, black: Floats) -> tuple[Spectrum, Spectrum]:
 def _black(nm: Floats) -> Floats:
     """Return a metameric black on a grid of reflectances, its largest value 1."""
     bumps = np.exp(-0.5 * ((nm[:, None] - np.arange(400.0, 721.0, 20.0)) / BUMP_NM) ** 2)
-    # Colours of every bump at fine resolution, and by products of averages over 10 nm: a black of both, so that a
-    # program that multiplies averages sees the pairs alike too.
+    # Colours of every bump, computed at fine resolution and also by products of averages over 10 nm. The black is one
+    # by both, so that the pairs look alike also to a program that multiplies averages.
     fine_nm = np.arange(380.5, 780.0)
     one_nm = np.ones(400)
     bands = (fine_nm, one_nm), (DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM))

@@ -1,7 +1,7 @@
-"""Grey scale on a ring, as ISO 14524 measures the opto-electronic conversion function (OECF) by one.
+"""Grey scale on a ring, such as ISO 14524 uses to measure the opto-electronic conversion function (OECF).
 
-The ring keeps all patches at one distance from the picture's middle, so that a lens's falloff is the same in each. As
-the standard has it, the cube roots of the patches' reflectances are evenly spaced.
+On the ring all patches have one distance from the picture's middle, so that a lens's falloff is the same in each. As in
+the standard, the cube roots of the patches' reflectances are evenly spaced.
 """
 
 from math import cos, pi, sin
@@ -14,8 +14,8 @@ from scenes.reflectances import grey
 
 BRIGHTEST = 0.9  # reflectance of the first patch
 GROUND = 0.18
-RADIUS_M = 0.17  # of the ring, in a picture 0.5 m high
-FILL = 0.6  # of the distance between neighbours, that a patch's side takes
+RADIUS_M = 0.17  # radius of the ring, in a picture 0.5 m high
+FILL = 0.6  # side of a patch over the distance between neighbours
 
 
 def oecf(patches: int = 12, contrast: float = 100.0, light: str = "D65") -> Scene:
@@ -24,7 +24,7 @@ def oecf(patches: int = 12, contrast: float = 100.0, light: str = "D65") -> Scen
     Parameters
     ----------
     patches : int
-        4 to 36; ISO 14524 takes 12, and ISO 15739 up to 20.
+        Number of patches, 4 to 36; ISO 14524 uses 12, and ISO 15739 up to 20.
     contrast : float
         Reflectance of the first patch, which is 0.9, over that of the last.
     light : str

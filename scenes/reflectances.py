@@ -11,7 +11,7 @@ from rodcone.curve_file import read_columns
 from rodcone.errors import InputError, in_place
 from rodcone.types import Floats
 
-LONGEST_NM = 1100.0  # as far as lights are known (`render.spectrum.flat`), beyond any response here
+LONGEST_NM = 1100.0  # longest wavelength at which lights are known (`render.spectrum.flat`), beyond any response here
 _NM = np.arange(380.0, 781.0, 5.0)  # the chart's own grid: one grid for all materials keeps scenes quick to compile
 
 
@@ -23,12 +23,12 @@ def color_checker_reflectances() -> tuple[tuple[str, Spectrum], ...]:
 
 
 def read_reflectances(path: str | Path) -> tuple[tuple[str, Spectrum], ...]:
-    """Read the name and reflectance of each column of a CSV but its first, ``wavelength_nm``.
+    """Read the name and reflectance of each column of a CSV, except the first one, ``wavelength_nm``.
 
     Raises
     ------
     InputError
-        For a file that is none such, or values outside 0 to 1.
+        For a file that isn't such a CSV, or values outside 0 to 1.
     """
     columns = read_columns(path, "chart")
     nm = columns.pop("wavelength_nm")

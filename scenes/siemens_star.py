@@ -1,4 +1,4 @@
-"""Siemens star: spokes that narrow towards the middle, every spatial frequency in every direction."""
+"""Siemens star: spokes that narrow towards the middle and so show every spatial frequency in every direction."""
 
 from render.geometry import camera, look_at, translate
 from render.scene import Scene

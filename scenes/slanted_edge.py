@@ -16,9 +16,9 @@ def slanted_edge(contrast: float = 4.0, angle_deg: float = 5.0, light: str = "D6
     Parameters
     ----------
     contrast : float
-        Bright over dark reflectance; the bright one is 0.6. ISO 12233:2014 takes 4, so that no sharpening clips.
+        Bright over dark reflectance; the bright one is 0.6. ISO 12233:2014 uses 4, so that sharpening doesn't clip.
     angle_deg : float
-        Lean of the edge from the vertical, anticlockwise, up to 45 degrees; ISO 12233 takes 5.
+        Lean of the edge from the vertical, anticlockwise, up to 45 degrees; ISO 12233 uses 5.
     light : str
         Illuminant of the sky, whose luminance is 100 cd/m^2.
     """

@@ -1,4 +1,4 @@
-"""Somebody who crosses the street of `scenes.night_street` by night: a scene that moves."""
+"""A scene that moves: somebody crosses the street of `scenes.night_street` by night."""
 
 from dataclasses import replace
 from math import cos, pi, radians, sin
@@ -9,10 +9,10 @@ from scenes.materials import ball, glossy, matte, rod
 from scenes.night_street import night_street
 from scenes.reflectances import band, edge, grey
 
-SPEED_M_S = 1.4  # of adults at their comfortable pace (Bohannon 1997, Age and Ageing 26: 1.27 to 1.46 m/s)
-STRIDE_M = 1.4  # of two steps
-_SWING_DEG = 25.0  # of a leg, to the front and to the back
-_START_M, _DEPTH_M = -1.5, -3.8  # where the walker is at time 0: across the street, and along it towards the camera
+SPEED_M_S = 1.4  # comfortable pace of adults (Bohannon 1997, Age and Ageing 26: 1.27 to 1.46 m/s)
+STRIDE_M = 1.4  # length of two steps
+_SWING_DEG = 25.0  # angle by which a leg swings forwards and backwards
+_START_M, _DEPTH_M = -1.5, -3.8  # place of the walker at time 0: across the street, and along it towards the camera
 _HIP_M, _SHOULDER_M, _HEAD_M = 0.90, 1.42, 1.64
 
 
@@ -27,7 +27,7 @@ def walker(time_s: float = 0.0) -> Scene:
     Raises
     ------
     InputError
-        For a time of over a minute.
+        For a time more than a minute before or after that.
     """
     require_range("time_s", time_s, -60.0, 60.0, "give seconds of the walk")
     street = night_street()
