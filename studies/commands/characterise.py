@@ -1,4 +1,4 @@
-"""The command `rodcone characterise`: figures of a chip as a laboratory measures them."""
+"""The command `rodcone characterise`, which measures a chip as a laboratory does."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -63,7 +63,7 @@ class Frames:
     seed: int = 0
 
     def part_of(self, preset: str) -> SensorConfig:
-        """Return the preset's sensor, or what stands for the chosen reading or channel where the preset has several."""
+        """Return the preset's sensor; if it has several readings or channels, a sensor with only the chosen one."""
         require_absent(f"for {preset!r}; allowed: with --from and --dark", window=self.window)
         sensor = sensor_preset(preset)
         readings = chip_readings(sensor, self.exposure)
@@ -169,7 +169,7 @@ def _measure_files(frames: Frames, out: Path | None, json: bool) -> None:
 
 
 def _plain(value: object) -> Any:
-    """Give a value with lists in place of arrays, as JSON holds it."""
+    """Return a value for JSON, with lists in place of arrays."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, dict):
@@ -178,7 +178,7 @@ def _plain(value: object) -> Any:
 
 
 def _facts(chip: Characterisation) -> dict[str, Any]:
-    """Return the measurement as JSON holds it."""
+    """Return the measurement as values for JSON."""
     series = {
         "light_e": chip.transfer.light_e,
         "mean_dn": chip.transfer.mean_dn,

@@ -1,4 +1,4 @@
-"""The command `rodcone`. Results on stdout, progress and errors on stderr; bad input exits with code 2."""
+"""The command `rodcone`. It prints results on stdout, progress and errors on stderr; bad input exits with code 2."""
 
 import re
 import sys
@@ -14,8 +14,8 @@ from rodcone.errors import InputError, is_out_of_memory
 from studies.commands.console import INTERRUPTED, say
 from studies.commands.watched import survive_sudden_end
 
-# Commands are imported only when they run, because other distributions have packages named render, sensor and so on:
-# `doctor`, which says whose packages Python finds, has to start in any case.
+# Commands are imported only when they run, because other distributions may have packages named render, sensor and so
+# on. Even then `doctor` has to start, which says whose packages Python finds.
 BAD_INPUT = 2
 _BELOW_ZERO = re.compile(r"-[\d.]")
 _NUMBER = re.compile(r"^-?[\d.]+$")
@@ -24,7 +24,7 @@ _UNITS = {"us", "ms", "s", "lux", "lx", "cd/m2", "cd/m²", "K"}
 
 
 def _converted(kind: object, tokens: Sequence[Token]) -> Any:
-    """Convert a value as Cyclopts does, but refuse a fraction where a whole number is expected: Cyclopts rounds it."""
+    """Convert a value as Cyclopts does, but refuse a fraction for a whole number, which Cyclopts would round."""
     if kind is int or int in get_args(kind):
         for token in tokens:
             if _FRACTION.match(token.value) and float(token.value) % 1:
@@ -79,7 +79,7 @@ app.register_install_completion_command(help="Let this shell complete rodcone's 
 
 
 def joined(arguments: Sequence[str]) -> list[str]:
-    """Return the arguments with ``-o`` and ``-D`` written out, and with numbers and units joined to what stands before.
+    """Return the arguments with ``-o`` and ``-D`` written out, and with some numbers and units joined to other words.
 
     A number below 0 is joined with the option before it, such as ``--level -5lux``, and a unit with the number before
     it, such as ``--exposure 20 ms``.
@@ -100,7 +100,7 @@ def joined(arguments: Sequence[str]) -> list[str]:
 
 
 def main(arguments: list[str] | None = None) -> Any:
-    """Run the command; one line on stderr and exit code 2 for bad input, 1 for a file that can't be written."""
+    """Run the command. For bad input, print one line on stderr and exit with 2; for a file error exit with 1."""
     try:
         with warnings.catch_warnings():
             # Warnings are printed like errors, without the place in the code, and each only once.

@@ -1,4 +1,4 @@
-"""What the commands share: kinds of options, and what is printed where."""
+"""Parts that the commands share: types of options, and functions that print results, notes and tables."""
 
 import json as notation
 import sys
@@ -37,7 +37,7 @@ INTERRUPTED = 130  # exit code after Ctrl-C: 128 + SIGINT
 
 
 def say(*notes: str) -> None:
-    """Print notes on stderr, a line each."""
+    """Print notes on stderr, one line per note."""
     for note in notes:
         print(f"rodcone: {note}", file=sys.stderr)
 
@@ -61,7 +61,7 @@ class Estimated(Protocol):
 
 
 def announce_cost(cost: Estimated, *, dry_run: bool, json: bool) -> bool:
-    """Print what a command will cost: as its result for a dry run, else on stderr. Return whether it shall begin."""
+    """Print what a command will cost: on stdout for a dry run, else on stderr. Return whether the command shall run."""
     if dry_run:
         print_result(cost.words(), cost.facts(), json=json)
     else:
@@ -85,14 +85,14 @@ def print_table(head: Sequence[str], rows: Iterable[Sequence[str | Text]], words
 
 
 def require_new(out: Path, ending: str) -> None:
-    """Raise `InputError` where a file to write has another ending, or exists."""
+    """Raise `InputError` if a file to write has another ending or exists already."""
     require_ending(out, ending)
     if out.exists():
         raise InputError(f"out: {str(out)!r} exists; allowed: a new file; choose another name or remove it")
 
 
 def require_place(out: Path | None, *endings: str) -> None:
-    """Raise `InputError` or `OSError` where a file, if one is asked for, can't be written under its name."""
+    """Raise `InputError` or `OSError` if a file can't be written under its name; do nothing for None."""
     if out is not None:
         require_ending(out, *endings)
         check_place(out)

@@ -1,7 +1,7 @@
 """The command `rodcone doctor`: versions, the LLVM library, the backend, and whose packages Python finds.
 
-Nothing of `render` is imported before its place is known: where another distribution's `render` shadows rodcone's,
-the report says so instead of failing at an import.
+`render` isn't imported before its folder is known. If another distribution's package `render` hides rodcone's, the
+report says so instead of failing at an import.
 """
 
 import os
@@ -34,7 +34,7 @@ FALLBACK = (
 
 @dataclass(frozen=True)
 class Finding:
-    """One line of the report; `ok` is False where rodcone can't work as it should."""
+    """One line of the report; `ok` is False if rodcone can't work properly because of it."""
 
     name: str
     value: str
@@ -57,7 +57,7 @@ def doctor() -> int:
 
 
 def findings() -> tuple[Finding, ...]:
-    """Collect all that is printed. Where a package is foreign or missing, the engine isn't imported."""
+    """Collect all lines of the report. If a package is foreign or missing, the engine isn't imported."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     home = Path(__file__).resolve().parents[2]
     others = intruders(home)
@@ -83,7 +83,7 @@ def findings() -> tuple[Finding, ...]:
 def file_findings(name: str) -> list[Finding]:
     """Report a file in the working directory that has the name of one of rodcone's packages.
 
-    A script beside it would import that file in place of the package.
+    A script in this folder would import that file in place of the package.
     """
     path = Path.cwd() / f"{name}.py"
     words = f"{path} would stand in the place of rodcone's package {name} for every script beside it; rename it"
@@ -91,7 +91,7 @@ def file_findings(name: str) -> list[Finding]:
 
 
 def distribution_finding(name: str, *, needed: bool = True) -> Finding:
-    """Report the version of a distribution; its absence is a fault only where it is needed."""
+    """Report the version of a distribution; if it is absent, that is a fault only if it is `needed`."""
     try:
         return Finding(name, metadata.version(name))
     except metadata.PackageNotFoundError:
@@ -99,7 +99,7 @@ def distribution_finding(name: str, *, needed: bool = True) -> Finding:
 
 
 def extra_finding(name: str) -> Finding:
-    """Report whether an extra is installed, and what it is for; its absence is no fault."""
+    """Report whether an extra is installed, and its purpose; its absence is no fault."""
     purpose, distributions = EXTRAS[name]
     installed = all(distribution_finding(finding, needed=False).value != _ABSENT for finding in distributions)
     state = "installed" if installed else f"not installed; pip install 'rodcone[{name}]'"
@@ -134,7 +134,7 @@ def package_finding(name: str, home: Path, intruder: str | None = None) -> Findi
 
 
 def llvm_finding(library: Path | None, version: int | None, oldest: int) -> Finding:
-    """Report the path, version and origin of the LLVM library, or the fix where it can't be used."""
+    """Report the path, version and origin of the LLVM library, or a remedy if it can't be used."""
     if library is None:
         return Finding("LLVM", f"none of version {oldest} or newer; pip install {LLVM_WHEEL} (Linux x86-64) brings one")
     fix = f"unset DRJIT_LIBLLVM_PATH or name a library of version {oldest} or newer"

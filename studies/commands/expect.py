@@ -29,7 +29,7 @@ _BYTES = 0.6e9
 
 @dataclass(frozen=True)
 class _Cost:
-    """Cost of a table of so many cameras and levels."""
+    """Cost of a table with a number of cameras and levels."""
 
     cameras: int
     levels: int

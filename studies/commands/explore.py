@@ -41,7 +41,7 @@ def explore(
     """
     require_server()
     opened = open_source(source, options)
-    by_name = replace(options, trust_scene=False, define=())  # because a scene of the catalogue takes neither option
+    by_name = replace(options, trust_scene=False, define=())  # a scene of the catalogue has neither option
     scenes = {name: partial(open_source, name, by_name) for name in scene_names()} | {opened.title: lambda: opened}
     with listen(port) as listener:
         say(*opened.notes)

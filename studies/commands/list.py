@@ -47,7 +47,7 @@ def _write_gallery(kind: Kind | None, out: Path) -> None:
     check_place(out)
     if kind == "lights":
         text = lights_svg({name: illuminants.illuminant(name) for name in texts(kind)})
-    else:  # sensors, with a * where channels don't share a unit
+    else:  # sensors, with a * if their channels don't share a unit
         measured = {
             f"{name}{'' if camera.balanced else '*'}": camera.responses for name, camera in measured_cameras().items()
         }

@@ -80,7 +80,7 @@ def reference(
     assert opened.scene is not None
     path = reference_path(folder, opened.scene, film)
     found = read_reference(path, opened.scene) if out else find_reference(opened.scene, film)
-    transport = found.transport if found else None  # continue the light that is there already
+    transport = found.transport if found else None  # continue an earlier render
     if not transport:
         cost = PictureCost(
             size=film.size,
@@ -131,19 +131,19 @@ def reference(
 
 
 def _so_far(transport: Transport, now: float, until: float) -> str:
-    """Write a progress line: samples, the share of the sensor's variance that they leave, and the time for the rest."""
+    """Write a progress line: samples, their noise as a share of the sensor's variance, and the time for the rest."""
     left_s = transport.seconds * (MARGIN * now / until - 1)
     words = f"; about {duration(left_s)} more to {until:g}" if now > until else ""
     return f"{transport.spp:.0f} samples a pixel: {now:.3g} of the sensor's variance in 95 % of pixels{words}"
 
 
 def _most(shares: Mapping[str, Mapping[str, float]]) -> float:
-    """Return the largest share over sensors and levels."""
+    """Return the largest of `_shares`, over sensors and levels."""
     return max(share for of_sensor in shares.values() for share in of_sensor.values())
 
 
 def _shares(transport: Transport, study: Study) -> dict[str, dict[str, float]]:
-    """Return the noise variance over the sensor's own that 95 % of the pixels stay below, by sensor and level."""
+    """Return by sensor and level the render's noise variance over the sensor's, below which 95 % of the pixels lie."""
     lux = lux_per_cd_m2(transport, study.levels)
     shares: dict[str, dict[str, float]] = {}
     for name in study.sensors:

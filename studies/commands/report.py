@@ -67,7 +67,7 @@ def _markdown(folder: Path, out: Path, camera: str | None, where: list[str] | No
 
 
 def write_results(folder: Path) -> Path:
-    """Write a sweep's report and its results as JSON into its folder; gives the report. Both appear or none.
+    """Write a sweep's report, and its results as JSON, into its folder, both or none; return the report's path.
 
     Over `studies.sweep.export.MOST_ROWS` rows there is no JSON, and a line says how to export them.
 
@@ -81,7 +81,7 @@ def write_results(folder: Path) -> Path:
     count = len(run.rows)
     results = None if count > MOST_ROWS else results_json(run)
     files = {folder / REPORT: marked(folder, page, results, run.content)}
-    if results is None:  # an old file is removed, because it holds less than the sweep
+    if results is None:  # an older results file is removed, because it doesn't have all rows of the sweep
         write_files(files)
         (folder / RESULTS).unlink(missing_ok=True)
         say(f"{count} rows are too many for {RESULTS}: rodcone export {folder} -o rows.csv writes them")
@@ -93,7 +93,7 @@ def write_results(folder: Path) -> Path:
 def write_report(
     folder: str | Path, path: str | Path, pictures: int | None = None, where: Mapping[str, str] | None = None
 ) -> Path:
-    """Write the report of a sweep's folder, whole or not at all; gives its path.
+    """Write the report of a sweep's folder, whole or not at all; return its path.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Whether a sweep's report still says what the results database holds: a run that makes no cell then leaves it.
+"""Find out whether a sweep's report is still current; if so, a run that makes no cell doesn't write it again.
 
-To draw the page, and to import what draws it, takes longer than all else that such a run does. The page ends in a mark,
-the hash of the page and of all that it is made of, so that one that was changed or cut short is written again.
+To draw the page, and to import the libraries for that, takes longer than all else that such a run does. The page ends
+in a mark, a hash of the page and of all that it is made from. So a page that was changed or cut short is written again.
 """
 
 import json
@@ -18,16 +18,16 @@ _DRAWN_BY = ("matplotlib", "jinja2", "pillow")
 
 
 def marked(folder: Path, page: str, results: bytes | None, stored: str) -> bytes:
-    """Return a page with its mark, which holds as long as the folder's rows, its results and our code are the same.
+    """Return a page with its mark, which is valid as long as the folder's rows, its results and our code are the same.
 
-    `stored` is `studies.sweep.database.content`.
+    `stored` is the hash from `studies.sweep.database.content`.
     """
     text = page.encode("utf-8")
     return text + _BEGIN + _mark(folder, text, results, stored).encode() + _END
 
 
 def is_current(folder: Path) -> bool:
-    """Return whether a folder's page, and its results file if it has one, are what would be written now."""
+    """Return whether a folder's page, and its results file if it has one, are the same as would be written now."""
     page, results = folder / REPORT, folder / RESULTS
     if not page.is_file():
         return False

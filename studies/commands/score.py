@@ -144,7 +144,7 @@ def _print_merits(name: str, merits: Sequence[Merit]) -> None:
 
 
 def _short(names: Sequence[str]) -> dict[str, str]:
-    """Name each camera by its file without folder and ending, where that tells them apart."""
+    """Name each camera by its file without folder and ending, if these names differ from each other."""
     short = [Path(name).stem for name in names]
     return dict(zip(names, short if len(set(short)) == len(names) else names, strict=True))
 

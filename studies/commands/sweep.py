@@ -1,4 +1,4 @@
-"""The command `rodcone sweep`, and what a run will take, before anything is computed."""
+"""The command `rodcone sweep`, and the estimate of a run's cost before anything is computed."""
 
 import errno
 import sys
@@ -102,7 +102,7 @@ class SweepOrder:
             require_absent("beside --reference", as_stated=self.as_stated)
 
     def plan(self, study: Study, step: Step) -> Plan:
-        """Return the study's plan: made by its pilots, as the study is stated, or with everything modelled."""
+        """Return the study's plan: from pilot renders, from the study's own settings, or with everything modelled."""
         if self.reference:
             return reference_plan(study)
         if self.as_stated:
@@ -151,7 +151,7 @@ def sweep(
 
 
 def require_enough(study: Study, sizes: Estimate, *, force: bool) -> None:
-    """Raise `InputError` where a study's processors lack a library, or more memory is needed than is free."""
+    """Raise `InputError` if a study's processors lack a library, or if more memory is needed than is free."""
     for name in study.processors:
         require_libraries(name)
     require_memory(Memory(sizes.bytes, sizes.largest_bytes), force)
@@ -166,7 +166,7 @@ def make_all(
     *,
     ahead: bool = True,
 ) -> tuple[SweepResult, Path]:
-    """Sweep a study into a folder and write its report there; says on stderr how far it is and what it had to assume.
+    """Sweep a study into a folder and write its report there; print progress and assumptions on stderr.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def make_all(
 
 @contextmanager
 def saying_what_is_kept(out: Path) -> Iterator[None]:
-    """Say what is kept where Ctrl-C or a full disk ends the sweep."""
+    """If Ctrl-C or a full disk ends the ``with`` block, say that the folder keeps what is done, and exit."""
     try:
         yield
     except KeyboardInterrupt:

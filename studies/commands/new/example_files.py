@@ -10,9 +10,10 @@ from studies.commands.console import require_new
 
 
 def copy_example(source: Path, out: Path, ending: str, beside: Mapping[Path, Path] = MappingProxyType({})) -> None:
-    """Copy a file to a new one and print its path; `beside` names the source of each file that belongs beside it.
+    """Copy a file to a new one, and print its path.
 
-    A file that is there already under one of these names has to have its source's content.
+    `beside` maps further files, which belong to it, to their sources. If one of them exists already, it must have its
+    source's content.
     """
     for target, other in beside.items():
         if target.exists() and target.read_bytes() != other.read_bytes():

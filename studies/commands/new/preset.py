@@ -23,7 +23,7 @@ from studies.commands.console import require_new, say
 from studies.commands.new.example_files import copy_example
 from studies.study.study_file import EXAMPLES
 
-_EYE = EXAMPLES / "sensors" / "eye.toml"  # no preset of `sensor.presets`, because receptors make no colour matrix
+_EYE = EXAMPLES / "sensors" / "eye.toml"  # not in `sensor.presets`, because an eye's receptors have no colour matrix
 
 
 def preset(
@@ -79,7 +79,7 @@ def preset(
     numbers = _numbers(noise, more_gain)
     if anchor is not None:
         numbers = replace(numbers, efficiency=_anchor(anchor), source=f"{numbers.source}; anchor {anchor} as given")
-    # Curves that a preset lends where the sources have none.
+    # Curves, lent by a preset if the sources have none.
     shape = None if measured is None else measured_curves(measured)
     if lender is not None:
         numbers = completed(numbers, lender, str(name))
