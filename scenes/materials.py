@@ -79,7 +79,7 @@ def printed(picture: str, dark: Spectrum, bright: Spectrum, repeats: float, turn
     """
     share = {
         "type": "bitmap",
-        "filename": f"skimage/data/{picture}.png",  # from the folder of wheels: the same wherever that is
+        "filename": f"skimage/data/{picture}.png",  # relative to the folder of wheels, wherever that is
         "raw": True,
         "wrap_mode": "mirror",
         "to_uv": to_world(scale(repeats, repeats, 1.0), rotate((0, 0, 1), turn_deg)),

@@ -40,7 +40,7 @@ class Merged:
     temporal_variance, fixed_variance : (h, w) float64
         Variance of the rate over exposures, and its variance over chips by DSNU and PRNU [(e-/s)^2].
     saturated : (h, w) bool
-        Where even the shortest exposure is full.
+        Pixels where even the shortest exposure is full.
     """
 
     rate_e_per_s: NDArray[np.float64]

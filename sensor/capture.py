@@ -40,8 +40,8 @@ def photograph_radiance(
     Parameters
     ----------
     radiance : SpectralRadiance or SpectralIrradiance
-        Quickest as float32 with band-planar memory, as renders are. An image on the sensor, of `form_image`, saves
-        forming it again.
+        Light of the scene; float32 with band-planar memory, as renders have it, is fastest. If an image on the sensor
+        from `form_image` is given, it isn't formed again.
     sensor : SensorConfig
     exposure_s : float, optional
         0 or more [s]; left out, by `sensor.exposure.auto_exposure_s`.
@@ -51,7 +51,7 @@ def photograph_radiance(
         Gives one key; draws depend on key, row, column and term alone. Left out, ``default_rng([0, 1])``.
     exact : bool
     samples_per_pixel : int
-        As `form_image` takes it.
+        As in `form_image`.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def photograph_radiance(
     Warns
     -----
     UserWarning
-        Where the bands don't fill the camera's window: what each channel loses.
+        If the bands don't fill the camera's window, on what each channel loses.
     """
     numpy_runs = exact or backend() == "numpy"
     formed = isinstance(radiance, SpectralIrradiance)
@@ -131,7 +131,7 @@ def expose(
     expected_e : (h, w) array
         Expected photo-electrons of each pixel in `exposure_s`, without dark current.
     sensor, exposure_s, device, rng, exact
-        As `photograph_radiance` takes them.
+        As in `photograph_radiance`.
 
     Raises
     ------

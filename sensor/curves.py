@@ -200,7 +200,7 @@ def read_csv(
     ir_cut : float or Spectrum, optional
         Filter in front: the wavelength from which it lets nothing through, or its transmittance.
     quantum_efficiency : float or Spectrum, optional
-        Of the photodiode, which multiplies every curve. None where the file holds it.
+        Quantum efficiency of the photodiode, by which every curve is multiplied. None if the file's curves include it.
     unit : str
         ``per_photon``; or ``per_watt`` for responses per radiant power, which are divided by the wavelength. These are
         amperes per watt, and so give electrons per photon, unless they are relative or a quantum efficiency is given:

@@ -31,13 +31,13 @@ class Device:
     column_gain : (w,) float64, optional
         Relative gain of each column's amplifier, mean 1; not negative. None where all are 1. (w / 2,) as above.
     hot : (h, w) bool, optional
-        Where a pixel is hot: a defect map as a camera's calibration holds it. None where no pixel is.
+        Map of hot pixels, like the defect map in a camera's calibration. None if no pixel is hot.
     telegraph_e : (h, w) float64, optional
         Height of each pixel's random telegraph noise [e-], 0 where it has no trap. None where no pixel has one.
         (h / 2, w / 2) as above.
     readings : tuple of Device
-        The chip as each of the sensor's several readings shows it: PRNU and hot pixels of its photodiode, offsets of
-        its own, the column amplifiers of all.
+        For a sensor with several readings, the patterns of each: PRNU and hot pixels of its photodiode, its own
+        offsets, and the column amplifiers, which all readings share.
     """
 
     photo_response: NDArray[np.float64]
@@ -93,7 +93,7 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
             hot = normals(key, NoiseTerm.HOT, shape, photodiode) < scipy.special.ndtri(pixel.hot_pixel_share)
         if pixel.telegraph_noise_e:
             rank = scipy.special.ndtr(normals(key, NoiseTerm.TELEGRAPH, offset_e.shape, photodiode))
-            # Under the share, a uniform rank over the share is uniform too, and its logarithm exponential.
+            # A uniform number below the share, divided by the share, is uniform too; its logarithm is exponential.
             telegraph_e = pixel.telegraph_e * np.maximum(-np.log(rank / pixel.telegraph_share), 0.0)
         return Device(response, offset_e, column_gain=column_gain, hot=hot, telegraph_e=telegraph_e)
 

@@ -34,7 +34,7 @@ def _fit() -> list[float]:
     exact = diffraction_otf(s, 1e3, LensConfig(1.0, diffraction=1.0))
     falling = (1 - s) ** 1.5
     fitted = Polynomial.fit(s, exact / falling, 5, domain=[0, 1], window=[0, 1], w=falling + 1e-3)
-    return [float(factor) for factor in fitted.coef[::-1]]  # of no NumPy type, so that s keeps its precision
+    return [float(factor) for factor in fitted.coef[::-1]]  # Python's floats, so that s keeps its precision
 
 
 _FIT = _fit()
@@ -98,7 +98,7 @@ def sampled_otf(
         Nyquist frequency that is the lens's own transfer, provided that its limit lies under the sampling frequency
         less that.
     real : type
-        Of the transfer's numbers.
+        Floating-point type of the result.
     """
     rows, columns = (np.arange(size) / (2 * size) for size in shape)
     # Along an axis sinc^2 of f and of f - 1, over their sum.

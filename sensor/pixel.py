@@ -110,11 +110,11 @@ class PixelConfig:
 
     @property
     def telegraph_noise_e(self) -> float:
-        """Standard deviation of random telegraph noise over all pixels [e-].
+        """Return the standard deviation of random telegraph noise over all pixels [e-].
 
-        A pixel's jump a is exponential over pixels, of the mean A. Correlated double sampling reads the trap twice and
-        takes the difference, which is -a, 0 or +a with 1/4, 1/2 and 1/4: variance a^2 / 2, and s A^2 over all pixels,
-        of which the share s has a trap.
+        The share s of pixels has a trap; over these the jump a is exponentially distributed with the mean A. Correlated
+        double sampling subtracts two states of the trap, which gives -a, 0 or +a with the probabilities 1/4, 1/2 and
+        1/4. So the variance is a^2 / 2 for a pixel with a trap, and s A^2 over all pixels.
         """
         return sqrt(self.telegraph_share) * self.telegraph_e
 
@@ -292,9 +292,9 @@ class Binning:
     photodiode : PixelConfig
         One of the four.
     bits, black_level_dn, white_level_dn : int, and int or None
-        Of the converter, as of `SensorConfig`, where it reads one photodiode.
+        Numbers of the converter, as in `SensorConfig`, when it reads one photodiode.
     converter_noise_dn : float
-        The same.
+        Noise after the amplifier, as in `SensorConfig`, when it reads one photodiode.
     """
 
     way: str

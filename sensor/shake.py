@@ -38,7 +38,7 @@ FOCAL_LENGTH_MM = 6.0  # focal length of a compact camera with Table 1's pixel
 SHAKES: Mapping[str, float] = MappingProxyType(
     {"hand": SPEED_RAD_PER_S / (2 * pi * RESONANCE_HZ) * FOCAL_LENGTH_MM * 1e3}
 )
-# of a path: no longer than that, and fewest and most of them
+# Longest time step of a path [s], and its fewest and most steps.
 STEP_S = 2e-3
 STEPS = (32, 4096)
 

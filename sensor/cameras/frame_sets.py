@@ -85,7 +85,7 @@ class Pixels:
 
 
 def is_set(path: Path) -> bool:
-    """Return whether a path names a set of frames (folder, zip, descriptor or list) and not a single raw file."""
+    """Return whether a path is a set of frames (folder, zip file, descriptor or list), not a single raw file."""
     return path.is_dir() or path.suffix.lower() in (".zip", ".txt", ".csv")
 
 

@@ -163,7 +163,7 @@ def preset_text(title: str, numbers: PixelNumbers, shape: Curves | None, curves:
     Parameters
     ----------
     title : str
-        What the camera is, on one line.
+        Description of the camera on one line.
     curves : str
         Name of the CSV of the responses, beside the file; empty for none.
     """

@@ -58,7 +58,7 @@ class Characterisation:
     linearity_share : (level,) float64
         Relative deviation of the mean from the fitted line; NaN beyond 5-95 % of saturation.
     notes : tuple of str
-        How to read the figures.
+        Notes on how to read the figures.
     """
 
     figures: tuple[FigureOfMerit, ...]
@@ -144,7 +144,7 @@ def plan_for(sensor: SensorConfig, exposure_s: float = 0.01) -> ExposurePlan:
 
 
 def measure_camera(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> Characterisation:
-    """Run the procedure on any chip; `sensor` gives the well to aim at and the values to compare with."""
+    """Run the procedure on any chip; `sensor` states its full well and the configured values for comparison."""
     # Frames
     dark = take_stack(expose, 0.0, plan.exposure_s, plan.frames)
     bright = take_stack(expose, 0.5 * sensor.top_e, plan.exposure_s, plan.frames)

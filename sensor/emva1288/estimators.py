@@ -29,7 +29,7 @@ def gain(transfer: Transfer, dark: Stack, saturation_e: float) -> Estimate:
     Raises
     ------
     InputError
-        Where the variance doesn't grow with the light: the converter or the well is too coarse to show shot noise.
+        If the variance doesn't grow with the light, because the converter is too coarse or the well too small.
     """
     used = transfer.light_e <= FIT_SHARE * saturation_e
     signal = transfer.mean_dn[used] - dark.mean_dn.mean()
@@ -151,5 +151,5 @@ def _squares(image: NDArray[np.float64]) -> Floats:
 
 
 def _spread_error(of_columns: Floats) -> float:
-    """Return the standard error of the mean over columns: they are independent where their pixels are not."""
+    """Return the standard error of the mean over columns, which are independent even if a column's pixels aren't."""
     return float(of_columns.std(ddof=1) / sqrt(of_columns.size))

@@ -131,5 +131,5 @@ def dark_slopes(expose: Expose, exposures_s: Sequence[float]) -> NDArray[np.floa
 def hot_pixels(slopes: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Mark pixels whose dark current is over 6 robust standard deviations above the median, shape (h, w)."""
     median = np.median(slopes)
-    spread = 1.4826 * np.median(np.abs(slopes - median))  # of a normal distribution, from the median deviation
+    spread = 1.4826 * np.median(np.abs(slopes - median))  # standard deviation, as of a normal distribution
     return np.asarray(slopes > median + 6 * spread)

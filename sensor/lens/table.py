@@ -92,7 +92,7 @@ class LensTable:
         Rising wavelengths; outside their range the nearest one is used.
     relative_illumination, distortion : (field,) float64
     lateral_um : (wavelength, field) float64
-        How much farther out than the undispersed image a wavelength lands.
+        Distance by which a wavelength lands farther out than the undispersed image [um].
     point_spread : Wavefronts, Kernels or None
         None for a lens that spreads light as an ideal one.
     digest : str

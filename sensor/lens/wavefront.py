@@ -101,7 +101,7 @@ def transfer(table: LensTable, height: float, wavelength_nm: float, radial: Floa
     Returns
     -------
     complex128 array
-        Of the frequencies' shape; 1 at 0, its absolute value the MTF.
+        Transfer in the shape of the frequencies; 1 at frequency 0. Its absolute value is the MTF.
     """
     radial, across = np.broadcast_arrays(np.asarray(radial, np.float64), np.asarray(across, np.float64))
     if isinstance(table.point_spread, Kernels):

@@ -30,7 +30,7 @@ def stops_to_white(raw: RawImage) -> float:
     balance = 1 / raw.colour.neutral[: len(names)]
     weights = np.asarray(luminance_of_srgb(raw.colour.to_srgb.T)) * balance  # luminance of each channel's electrons
     electrons = raw.electrons
-    sites = [sum(row.count(name) for row in raw.cfa) for name in names]  # of a tile
+    sites = [sum(row.count(name) for row in raw.cfa) for name in names]  # number of sites in a tile
     tile = np.array([len(raw.cfa), len(raw.cfa[0])])
     tiles = 1
     while True:

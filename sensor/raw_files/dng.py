@@ -46,7 +46,7 @@ CFA_REPEAT, CFA_PATTERN, BLACK_LEVEL, WHITE_LEVEL = 33421, 33422, 50714, 50717
 OPCODES = 51008  # OpcodeList1: what is done to the samples as read
 EXPOSURE_TIME, F_NUMBER, ISO = 33434, 33437, 34855
 BASELINE_EXPOSURE, IMAGE_NUMBER = 50730, 37393
-LEAST_BYTES = 100_000  # RawTherapee 5.9 takes no smaller file for a raw one
+LEAST_BYTES = 100_000  # RawTherapee 5.9 doesn't accept a smaller file as a raw file
 CROPPED_PX = 2  # pixels cropped on each side for interpolation; Adobe's DNG SDK warns of fewer
 _COMPARED = {
     CFA_REPEAT: "CFARepeatPatternDim",
@@ -111,7 +111,7 @@ def read_dng(path: Path) -> RawImage:
     raw = raw_image(parse_json(content[len(PRIVATE) :], str(path)), dn, str(path))
     if not is_in_dng(raw.cfa):
         raise InputError(f"{path}: its calibration has the mosaic {raw.cfa}; allowed: an unchanged file; write it anew")
-    # Files of version 0.1 have floats as they are, and black's fraction.
+    # Files of version 0.1 have floats without a scale, and a BlackLevel with a fraction.
     earlier: dict[int, list[tuple[str, Values]]] = {
         BLACK_LEVEL: [("2I", rational(raw.black_dn)), ("2I", rational(round(raw.black_dn)))],
         WHITE_LEVEL: [("I", (int(raw.white_dn),))],

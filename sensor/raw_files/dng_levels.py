@@ -18,14 +18,14 @@ from rodcone.types import Floats
 from sensor.cfa import Tile
 from sensor.raw_files.tiff import CFA, HEIGHT, PHOTOMETRIC, SUB_DIRECTORIES, WIDTH, Tags, read_directory
 
-_MOST_DIRECTORIES = 64  # of a file
+_MOST_DIRECTORIES = 64  # most directories of a file that are read
 
 # The known tags that change samples, their place or their meaning. LibRaw applies LINEARIZATION.
 VERSION, LINEARIZATION = 50706, 50712
 CFA_REPEAT, CFA_PATTERN, CFA_COLOURS = 33421, 33422, 50710
 BLACK_REPEAT, BLACK, BLACK_ROW, BLACK_COLUMN = 50713, 50714, 50715, 50716  # BlackLevelDeltaH is per column
 WHITE, ACTIVE_AREA = 50717, 50829
-_FIXED = {  # by name, and the values without effect; others are refused
+_FIXED = {  # name of each tag, and the values with which it has no effect; other values are refused
     50711: ("CFALayout", (1,)),
     50718: ("DefaultScale", (1.0, 1.0)),
     50975: ("RowInterleaveFactor", (1,)),

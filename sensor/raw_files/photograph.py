@@ -72,9 +72,9 @@ def read_photograph(path: Path) -> tuple[RawImage, dict[str, Any]]:
     Returns
     -------
     RawImage
-        Its black level is the largest of the samples', the others shifted up to it: of a digital negative as its own
-        tags have it for each row and column, of other files as LibRaw has it for each channel. Its matrix is the one
-        that LibRaw holds for the camera, for daylight, under both of a calibration's illuminants.
+        It has one black level, the largest in the file; samples with a lower one are shifted up. A digital negative's
+        own tags state black for each row and column; for other files LibRaw states it for each channel. Both
+        illuminants of the calibration have the same matrix, LibRaw's for the camera in daylight.
     dict
         ``reader``; ``noise``: where gain and dark noise come from (``profile of the file``, ``estimated from the
         frame`` or ``assumed``); ``gain_e_per_dn``, ``dark_noise_e``; ``as_shot``: ``file``, ``daylight`` where the file
@@ -90,7 +90,7 @@ def read_photograph(path: Path) -> tuple[RawImage, dict[str, Any]]:
     size = require_file(path)
     try:
         with rawpy.imread(str(path)) as opened:
-            # A header that claims more pixels than its file can hold: LibRaw takes memory for them all.
+            # A header may claim more pixels than its file can hold, and LibRaw would allocate memory for all of them.
             height, width = int(opened.sizes.raw_height), int(opened.sizes.raw_width)
             if 2 * height * width > MOST_EXPANSION * size:
                 raise InputError(f"{path}: {size} bytes can't hold the {height} x {width} pixels that it declares")

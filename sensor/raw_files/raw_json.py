@@ -16,11 +16,11 @@ VERSION = 1
 KEYS = tuple(field.name for field in fields(RawImage) if field.name != "dn")
 _OPTIONAL = ("defects", "noise_steps", "channel_noise", "dark_current_e", "crosstalk")  # left out where there are none
 _LONGEST_KEY = 400  # characters of an unknown key in a message: a damaged file may hold a mebibyte there
-MOST_BYTES = 1 << 20  # of the text: sixteen channels' calibration takes some 5 kB
+MOST_BYTES = 1 << 20  # most bytes of the text; the calibration of sixteen channels takes some 5 kB
 
 
 def raw_to_json(raw: RawImage, **more: object) -> str:
-    """Write as JSON all that a raw image holds beside its pixels, and the keys of `more`.
+    """Return as JSON all that a raw image holds besides its pixels, and the keys of `more`.
 
     Numbers are the shortest decimals that read back as the same float64. A key of `_OPTIONAL` is left out where it has
     no value.
@@ -82,7 +82,7 @@ def raw_image(calibration: dict[str, Any], dn: NDArray[np.uint16], name: str) ->
     Raises
     ------
     InputError
-        For a value of the wrong type or out of its range; `name` stands in front.
+        For a value of the wrong type or out of its range; the message begins with `name`.
     """
     try:
         structured = {

@@ -22,7 +22,7 @@ Tags = Mapping[int, tuple[str, Values]]  # by code: format of one value (below),
 WIDTH, HEIGHT, BITS_PER_SAMPLE, COMPRESSION, PHOTOMETRIC = 256, 257, 258, 259, 262
 STRIP_OFFSETS, SAMPLES_PER_PIXEL, STRIP_BYTE_COUNTS, SAMPLE_FORMAT = 273, 277, 279, 339
 EXIF, SUB_DIRECTORIES = 34665, 330  # the latter: SubIFDs (TIFF 6.0, Supplement 1)
-_MOST_SUB_DIRECTORIES = 16  # that are looked into for the mosaic
+_MOST_SUB_DIRECTORIES = 16  # most sub-directories in which the mosaic is searched
 _EXIF_PLACE = 34664  # no tag's code: tifffile doesn't write EXIF, so this entry is written and then changed into it
 MIN_IS_BLACK, CFA = 1, 32803
 _LAYOUT = (WIDTH, HEIGHT, BITS_PER_SAMPLE, COMPRESSION, PHOTOMETRIC, STRIP_OFFSETS, SAMPLES_PER_PIXEL)
@@ -33,7 +33,7 @@ _SAMPLES: dict[tuple[tuple[int, ...], tuple[int, ...]], np.dtype[Any]] = {
 _FORMATS = dict(enumerate(("B", "s", "H", "I", "2I", "b", "U", "h", "i", "2i", "f", "d", "I"), start=1))  # by type
 _BYTES = "BsU"  # formats whose values are bytes: numbers, ASCII, and those whose meaning is the tag's own
 _TYPES = {form: kind for kind, form in reversed(_FORMATS.items())}
-_MOST_VALUE_BYTES = 1 << 20  # of one tag: a million pixel rows in strips of four, or any calibration
+_MOST_VALUE_BYTES = 1 << 20  # most bytes of one tag: a million pixel rows in strips of four, or any calibration
 _LONGEST_SIDE = 1 << 17  # pixels; no single chip is larger
 
 

@@ -37,8 +37,8 @@ class Seams:
     ----------
     order : (reading,) intp
     handover_e : (reading,) float64
-        Photo-electrons of the whole pixel, under 0 where dark current fills the reading; of the last the level from
-        which it may clip.
+        Photo-electrons of the whole pixel at which the merge leaves the reading out; below 0 if dark current alone
+        fills it. For the last reading, the level from which on it may clip.
     """
 
     order: NDArray[np.intp]

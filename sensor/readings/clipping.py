@@ -90,7 +90,7 @@ def clipped(light_e: Floats, reading: PlainReading) -> Moments:
         mean[near] += first
         variance[near], slope[near] = second - first**2, open_ * slope[near]
 
-    # Clip at black: only the noise of reading takes samples there, for counts aren't negative; rounding clips none.
+    # Clip at black. Only the noise of reading brings samples below it: counts aren't negative, and rounding clips none.
     bottom_e = -sensor.black_dn * sensor.gain_e_per_dn / share - black_e
     rounding_e2 = reading.sources["quantisation"].dark_e ** 2
     after_e2 = law.variance(np.zeros(1)) - reading.counted_law.variance(np.zeros(1))

@@ -49,7 +49,7 @@ def file_schema(kind: Kind) -> dict[str, Any]:
 def sensor_schema() -> dict[str, Any]:
     """Return the schema of a sensor file.
 
-    Of a pixel that is read more than once the readings hold the noise, and a lens by data holds its f-number.
+    If a pixel is read several times, its readings state the noise; a lens by data states its own f-number.
     """
     stated = get_type_hints(SensorConfig)
     # Fields that the table leaves for the sensor to check have the types of the sensor's fields.
