@@ -19,7 +19,7 @@ STEP = 3.0  # factors between radiances; no power of two, which would be exact w
 
 
 def monotone(situation: Situation) -> Margin:
-    """More light never gives fewer electrons: every value of the radiance raised by a share of its own, 0 to 1e-3."""
+    """More light never gives fewer electrons: each value of the radiance is raised by a random share, 0 to 1e-3."""
     values = situation.radiance.values
     raised = values.astype(np.float64) * (1 + 1e-3 * np.random.default_rng(8).uniform(0.0, 1.0, values.shape))
     raised = np.minimum(raised, np.finfo(values.dtype).max).astype(values.dtype)
@@ -28,7 +28,7 @@ def monotone(situation: Situation) -> Margin:
 
 
 def linear(situation: Situation) -> Margin:
-    """Two lights together give the sum of what each gives alone: the scene upside down is added to a part of it."""
+    """Two lights together give the sum of what each gives alone. The second light is the scene upside down."""
     values = situation.radiance.values
     part = values / values.dtype.type(STEP)
     other = np.ascontiguousarray(part[::-1])
@@ -46,7 +46,7 @@ def reciprocal(situation: Situation) -> Margin:
 
 
 def shifted(situation: Situation) -> Margin | None:
-    """A scene shifted by a tile gives electrons shifted by a tile, between the frame's quarters; not with cos^4."""
+    """A scene shifted by a tile gives electrons shifted by a tile, in the frame's inner half; not tried with cos^4."""
     tile, samples = (len(situation.sensor.cfa), len(situation.sensor.cfa[0])), situation.samples_per_pixel
     height, width = situation.shape
     inside = slice(height // 4, height - height // 4), slice(width // 4, width - width // 4)

@@ -25,7 +25,7 @@ ROOM_SIGMAS = 6.0  # between a mean and the full well: less than 1e-9 of the dra
 
 
 def bounded(situation: Situation) -> Margin:
-    """Everything is finite, DN lie in the converter's range, pictures in what samples, balance and matrix allow."""
+    """All values are finite, DN are in the converter's range, and pictures in that of samples, balance and matrix."""
     worst = []
     for name in CAMERAS:
         electrons = expected(behind(situation, name))
@@ -55,7 +55,7 @@ def _picture_bound(raw: RawImage, situation: Situation) -> Image:
 
 
 def raw_unbiased(situation: Situation) -> Margin | None:
-    """The mean over chips and exposures of each channel's pixels is what was expected over black."""
+    """The mean of each channel's pixels over chips and exposures, less black, is the expected value."""
     margins = []
     for name in CAMERAS:
         sensor = behind(situation, name).sensor
@@ -73,7 +73,7 @@ def raw_unbiased(situation: Situation) -> Margin | None:
 
 
 def pictures_unbiased(situation: Situation) -> Margin | None:
-    """Both pictures of an even field, lit as the frame's median pixel is, have the colour expected of it."""
+    """Both pictures of an even field, lit like the frame's median pixel, have the expected colour."""
     level = flat_field(situation)
     margins = []
     for name in CAMERAS:

@@ -25,7 +25,7 @@ GUIDE = 24  # pixels that a pixel of the guide depends on
 
 
 def equivariant(situation: Situation) -> Margin | None:
-    """Mirrored both ways, and without its first tile's rows and columns: the same picture, mirrored or cut."""
+    """A raw image that is mirrored, or cut by its first tile, gives the same picture, mirrored or cut."""
     margins = []
     for name in CAMERAS:
         raw = shoot(situation, name)

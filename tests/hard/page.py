@@ -16,12 +16,12 @@ COLUMNS = (*INVARIANTS, OWN)
 
 TEXT = """# Hard cases
 
-A camera simulator should stay right at the ends of every range: the sun's glint, no light at all, a frame of three
-rows, a well of a million electrons. Each case on this page is taken through the whole chain, and it is measured how far
-it is from breaking each of the promises below. `make hard-cases` does so and writes this page. `pytest tests/hard -k
-sun_glint` runs one case. Both fail for anything that breaks a promise and isn't listed as a limit. Unless a case says
-otherwise, the scene is `cornell_box` at 64 × 64 pixels, the camera `low_noise` with an RGBW and a Bayer mosaic, and the
-exposure 10 ms.
+A camera simulator should be right at the ends of every range: with the sun's glint, with no light at all, with a frame
+of three rows, or with a well of a million electrons. `make hard-cases` runs each of these cases through the whole
+chain, measures how far it is from breaking each of the promises below, and writes this page. `pytest tests/hard -k
+sun_glint` runs one case. Both commands fail if a case breaks a promise and isn't listed as a limit. Unless a case says
+otherwise, the scene is `cornell_box` at 64 × 64 pixels, the camera is `low_noise` with an RGBW and a Bayer mosaic, and
+the exposure is 10 ms.
 
 {summary}
 
@@ -29,19 +29,20 @@ exposure 10 ms.
 
 {invariants}
 
-Each number is the worst error as a share of what is allowed: the invariant is kept up to 1. Electrons may differ by
-10⁻⁶ of a pixel's expected electrons. The mean of 32 raw images or 12 pictures may differ by what a false-alarm rate of
-10⁻⁶ allows, and mirrored and cut pictures by the rounding of the arithmetic.
+Each number in the file below is the worst error divided by the error that is allowed, so the invariant is kept up to 1.
+Electrons may differ by 10⁻⁶ of a pixel's expected electrons. The mean of 32 raw images or 12 pictures may differ by
+what a false-alarm rate of 10⁻⁶ allows. Mirrored and cut pictures may differ by the rounding of the arithmetic.
 
 ## Limits
 
-The table lists what isn't kept, by how much, and why. A test in `tests/hard` holds this list to be exact.
+The table lists what isn't kept, by how much, and why. A test in `tests/hard` checks that this list is exact.
 
 {limits}
 
 ## Tables
 
-Every case with its margins, empty where an invariant says nothing about it: [hard_cases.csv](results/hard_cases.csv).
+[hard_cases.csv](results/hard_cases.csv) has every case with its margins. A cell is empty if the invariant says nothing
+about the case.
 """
 
 
