@@ -14,8 +14,8 @@ from isp.planes import BLOCK_ROWS
 from isp.settings import SIGMA_S, Settings
 from sensor.raw import RawImage, noise_at_sites
 
-# With these numbers, a pixel of a flat field leaves out at most 3 of 10 000 samples and at most 0.3 % of the light; the
-# worst case is 0.2 e-.
+# With these numbers, at most 3 of 10 000 samples of a flat field lie above the limit, and at most 0.3 % of its light is
+# lost: most at a mean of 0.2 e- per sample without dark noise.
 SIGMAS = 2.5  # standard deviations that a sample may lie above the brightest of the 9 or more samples around
 MOST_SIGMAS = 1e3  # from this number on there is no limit
 FEWEST_E = 2.25  # without dark noise, samples of 1 and 2 electrons count even where all samples around hold none

@@ -98,7 +98,8 @@ def weights(weight: Singles, inner: Singles, shape: tuple[int, int], size: int) 
     across = size // STRIDE
     pixels = np.zeros(((ny - 1) * STRIDE + size, nx - 1 + across, STRIDE), np.float32)
     cells = np.zeros((ny - 1 + across, nx - 1 + across, 5), np.float32)
-    # The window is the product of a row and a column, so weights are summed across first and then down; so are cells.
+    # The window is the product of a row and a column. Sums over overlapping patches are therefore made across first and
+    # then down, at the pixels and, with even weights, at the cells.
     sides = taper(size).reshape(across, STRIDE)
     for rows in strips(ny, ROWS):
         part = slice(rows.start * nx, rows.stop * nx)

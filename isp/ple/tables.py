@@ -28,8 +28,8 @@ PILOT_VARIANCE = 0.02  # typical variance of a coarser scale's means [units of n
 BRIGHTNESS = 0.98  # share of that variance that lies in brightness; a coarser scale knows colour much better
 TAPER = 1.0  # power of the half sine by which a patch's pixels are weighted
 DIRECTIONS = 20  # number of directions for the approximate likelihood, which selects candidates
-# A candidate's approximate log likelihood lies at most so far below the largest: the first number if the remaining
-# directions hold only noise, the second if they hold only signal.
+# A component is a candidate for a patch if its approximate log likelihood is less than this below the largest. The
+# first number holds if the directions beyond `DIRECTIONS` hold only noise, the second if they hold only signal.
 MARGINS = (5.0, 15.0)
 # Number of tables that are kept, which suffices for a 4x4 tile over six decades of light. A table has 0.6 MB, and for
 # 8x8 pixels 90 kB more per component that a patch has needed.

@@ -91,7 +91,11 @@ def transform(electrons: NDArray[Any], dark_e: float) -> NDArray[Any]:
 
 @lru_cache(maxsize=256)
 def readings(dark_e: float) -> Readings:
-    """Return the curves of readings at one dark noise [e-]."""
+    """Tabulate mean, slope and variance of a transformed sample over expected electrons, and the mean's inverse.
+
+    They hold for one dark noise [e-]. Below 1 e- they are sums over Poisson's counts, from there on over the skewed
+    normal distribution of the module's text.
+    """
     roots = np.linspace(0.0, _LARGEST_ROOT * max(dark_e, 1.0), _KNOTS)
     electrons = roots[:, None] ** 2
     density = np.exp(-0.5 * _NORMAL**2)

@@ -139,9 +139,9 @@ def _denoised_share(error: Planes, residuals: tuple[Planes, Planes]) -> Planes:
     from scipy.ndimage import gaussian_filter  # imported here, because a render without denoiser doesn't need it
 
     variance, even, odd = (gaussian_filter(np.square(x).mean(axis=0), MIXING_PIXELS) for x in (error, *residuals))
-    # E is estimated for a half, which has twice the variance of the mean: an upper bound for the mean's. The window
-    # averages 4 pi s^2 independent pixels, so a variance has the relative error sqrt(2 / pixels); only what exceeds
-    # that error counts as E.
+    # A squared residual is E of one denoised half plus the variance of the other half, 2 V. E of a half is an upper
+    # bound for E of the whole picture, which has less noise. Over the window's 4 pi s^2 independent pixels, the
+    # estimate of 2 V has the relative error sqrt(2 / pixels); only what exceeds 2 V by more than that counts as E.
     of_half = 2 * variance
     pixels = 4 * np.pi * MIXING_PIXELS**2
     squared = np.maximum((even + odd) / 2 - of_half - of_half * (2 / pixels) ** 0.5, 0)

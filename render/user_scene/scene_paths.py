@@ -124,7 +124,8 @@ def _screen(path: Path, bases: list[Path], allowed: list[Path] | None, level: in
         nonlocal depth
         depth += 1
         try:
-            # As in Mitsuba, a file's own folder counts only for its includes, that of the including file for all files.
+            # As in Mitsuba, a file's own folder is searched only for files that it includes. Its other files are
+            # searched for in `bases`, which hold the folder of the file that included it.
             places = [path.parent, *bases] if tag == "include" else bases
             named = _checked_element(tag, attributes, depth, places, allowed, spent)
             if tag == "path":  # the latest comes first

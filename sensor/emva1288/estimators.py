@@ -23,8 +23,8 @@ Estimate = tuple[float, float]
 def gain(transfer: Transfer, dark: Stack, saturation_e: float) -> Estimate:
     """Estimate the overall system gain K [DN/e-]: the slope of temporal variance over mean up to 70 % of saturation.
 
-    Both are taken above the dark's. The line goes through the dark point, whose variance is subtracted from all others,
-    so its error counts once for all.
+    Mean and variance of the dark frames are subtracted from those of all others, and the line goes through the origin.
+    The error of the dark variance is therefore common to all points, and the standard error treats it so.
 
     Raises
     ------

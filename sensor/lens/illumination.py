@@ -119,7 +119,11 @@ def _shift(lens: LensConfig) -> float:
 
 
 def _common_area(height: Floats, shift: float, start: float) -> NDArray[np.float64]:
-    """Return the area that a unit circle shares with one of radius 1 + shift x start, shift x height beside it."""
+    """Return the area that the pupil, a unit circle, shares with the rim.
+
+    The rim is a circle of radius 1 + k h0, whose centre lies k h beside the pupil's: `shift` is k, `start` is h0, and
+    `height` is h.
+    """
     radius = 1 + shift * start
     apart = np.clip(shift * height, radius - 1, radius + 1)
     within = apart > radius - 1

@@ -14,8 +14,9 @@ from rodcone.errors import InputError, is_out_of_memory
 from studies.commands.console import INTERRUPTED, say
 from studies.commands.watched import survive_sudden_end
 
-# Commands are imported only when they run, because other distributions may have packages named render, sensor and so
-# on. Even then `doctor` has to start, which says whose packages Python finds.
+# A command is imported only when it runs. Another distribution may have a package named render or sensor that hides
+# ours, and `doctor`, which says whose packages Python finds, has to start even in that case.
+
 BAD_INPUT = 2
 _BELOW_ZERO = re.compile(r"-[\d.]")
 _NUMBER = re.compile(r"^-?[\d.]+$")

@@ -50,7 +50,10 @@ def balance_text(balance: Mapping[str, str]) -> str:
 
 
 def cell_view(cell: ReportCell, level: ReportLevel, group: str) -> dict[str, Any]:
-    """Return what the page says about one picture, as texts, and the picture's figures for every seed, as numbers."""
+    """Return what the page shows beside one picture: texts, and of each figure a mean and an interval.
+
+    The mean is over seeds; the second number is half the width of its 95 % interval, None if it isn't known.
+    """
     row = cell.first
     share = cell.mean("mc_share")
     electrons = json.loads(row.mean_electrons) if row else {}

@@ -77,14 +77,14 @@ def coverage() -> float:
 
 
 def signal_claims(ratios: Mapping[str, Ratios], least: float) -> tuple[Claim, ...]:
-    """Judge the claims that W is wideband, and that it gathers 6 and 10 times as much light.
+    """Judge the claims that W is wideband, and that it gathers 6 times as much light as G and 10 times as R and B.
 
     Parameters
     ----------
     ratios : mapping
-        `signal_ratios` by light.
+        Electrons of W over those of R, G and B (`signal_ratios`), by light.
     least : float
-        As from `coverage`.
+        Smallest ratio, over wavelength, of W's response to the largest of R's, G's and B's (`coverage`).
     """
     return (
         judge_claim(10, {"W over the largest of the three, at its least": least}),

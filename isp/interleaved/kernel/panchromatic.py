@@ -147,6 +147,10 @@ def guide_frame(raw: RawImage, ratios: Floats, white: int) -> tuple[NDArray[np.f
 
 
 def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Compute a band of rows: surroundings' shares (tile row, column, channel), and the guide g of the rows `inside`.
+
+    The guide is in electrons of W. x, v, N, t, T, D and g are those of `isp.interleaved.panchromatic.read_as_white`.
+    """
     jit = arrays()
     raw = frame.raw
     shot, dark, _ = channel_noise(frame.raw)
@@ -180,7 +184,7 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     tiles = _grid(-(-height // down), -(-width // across), max(*surroundings_steps(down), *surroundings_steps(across)))
     shares, around = _shares(frame, tiles, (height, width), samples, float(dark[frame.white]))
 
-    # Compute v, which is W by the sample itself, and its weight.
+    # v: what W would read by this sample alone; its weight is 1 / N.
     of_tile = tile_row[0] * dr.opaque(jit.UInt, -(-width // across)) + tile_column[0]
     own = at_site(pixels.load(shares, [of_tile], len(frame.ratios))[0], site)
     shots, darks = at_site(opaque(shot), site), at_site(opaque(dark), site)
