@@ -17,7 +17,6 @@ from math import hypot, pi, sqrt
 
 import numpy as np
 import scipy
-from scipy.ndimage import uniform_filter
 
 from rodcone.types import Floats, Mosaic
 from sensor.cfa import mask
@@ -93,11 +92,11 @@ def beyond_the_well(raw: RawImage, neutral: Floats) -> Mosaic:
         sites = mask(raw.cfa, name, raw.shape)
         read[sites] = of_neutral
         counted = sites & ~full
-        share = uniform_filter(counted.astype(np.float64), 3, mode="mirror")
-        total = uniform_filter(np.where(counted, electrons / of_neutral, 0.0), 3, mode="mirror")
+        share = scipy.ndimage.uniform_filter(counted.astype(np.float64), 3, mode="mirror")
+        total = scipy.ndimage.uniform_filter(np.where(counted, electrons / of_neutral, 0.0), 3, mode="mirror")
         np.divide(total, share, out=level, where=share > LEAST_COUNTED)
-    told = np.sum(levels, axis=0) / np.maximum(np.sum(levels > 0, axis=0), 1)
-    return np.where(full, np.maximum(electrons, told * read), electrons)
+    light = np.sum(levels, axis=0) / np.maximum(np.sum(levels > 0, axis=0), 1)
+    return np.where(full, np.maximum(electrons, light * read), electrons)
 
 
 def unspread_charge(electrons: Mosaic, crosstalk: float) -> Mosaic:

@@ -111,7 +111,8 @@ def test_commands_that_may_need_no_renderer_import_none(command: str) -> None:
     """Dr.Jit takes a quarter of a second and 60 MB, which `ple` and a light from a file don't need."""
     program = (
         f"import sys, studies.commands.{command}; "
-        f"print([name for name in 'mitsuba drjit matplotlib colour scipy.linalg'.split() if name in sys.modules])"
+        f"slow = 'mitsuba drjit matplotlib colour scipy.linalg scipy.ndimage'.split(); "
+        f"print([name for name in slow if name in sys.modules])"
     )
     assert in_new_python(program).splitlines()[-1] == "[]"
 
