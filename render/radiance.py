@@ -214,7 +214,9 @@ class BandRadiance:
 
     def whole(self) -> SpectralRadiance:
         """Compute all bands at once."""
-        planes = np.stack([self.make(band) for band in range(self.wavelength_nm.size)])
+        planes = np.empty((self.wavelength_nm.size, *self.shape), np.float32)
+        for band in range(self.wavelength_nm.size):
+            planes[band] = self.make(band)
         return SpectralRadiance(
             np.moveaxis(planes, 0, -1),
             self.wavelength_nm,

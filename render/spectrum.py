@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib import metadata
 from pathlib import Path
+from types import EllipsisType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,6 +34,7 @@ OBSERVER_NM: Floats = np.arange(360.0, 831.0)  # corners of the CIE 1931 observe
 DEFAULT_WAVELENGTH_NM: Floats = np.arange(385.0, 780.0, 10.0)  # centres of 40 bands that fill 380-780 nm
 # Default width of a render's bands: electrons of charts err by 0.05 % under smooth light, by 0.3 to 1.6 % under lines.
 RENDER_BAND_NM = 20.0
+BLOCK = 1 << 16  # pixels whose bands are summed in double precision at once
 
 
 @dataclass(frozen=True)
@@ -317,8 +319,7 @@ def luminance(
     light : Spectrum, optional
         The lamp behind the band means, up to a factor (`render.band_weights`).
     """
-    weights = observer_weights(wavelength_nm, width_nm, light)[1]
-    return np.asarray(LUMINOUS_EFFICACY_LM_W * (spectral @ weights), dtype=np.float64)
+    return _photometric(spectral, observer_weights(wavelength_nm, width_nm, light)[1])
 
 
 def tristimulus(
@@ -328,8 +329,30 @@ def tristimulus(
 
     Parameters are those of `luminance`.
     """
-    weights = observer_weights(wavelength_nm, width_nm, light).T
-    return np.asarray(LUMINOUS_EFFICACY_LM_W * (spectral @ weights), dtype=np.float64)
+    return _photometric(spectral, observer_weights(wavelength_nm, width_nm, light).T)
+
+
+def _photometric(spectral: NDArray[np.floating], weights: Floats) -> NDArray[np.float64]:
+    """Return K_m times the sum over bands of values times weights, which are (band,) or (band, n).
+
+    A picture is summed some rows at a time, because NumPy copies in double precision all that it is given at once.
+    """
+    sums = np.empty((*spectral.shape[:-1], *weights.shape[1:]))
+    for rows in row_blocks(spectral.shape[:-1]):
+        sums[rows] = spectral[rows] @ weights
+    sums *= LUMINOUS_EFFICACY_LM_W
+    return sums
+
+
+def row_blocks(shape: tuple[int, ...]) -> list[slice | EllipsisType]:
+    """Return indices that together select all rows of a picture (h, w), each `BLOCK` pixels or one row.
+
+    Anything but a picture is selected as a whole.
+    """
+    if len(shape) != 2 or shape[0] * shape[1] <= BLOCK:
+        return [...]
+    together = max(1, BLOCK // shape[1])
+    return [slice(first, first + together) for first in range(0, shape[0], together)]
 
 
 def observer_weights(wavelength_nm: ArrayLike, width_nm: ArrayLike, light: Spectrum | None = None) -> Floats:

@@ -426,6 +426,12 @@ def light_alone(transport: Transport) -> Transport:
     return replace(transport, variance=none, shared=None, coverage=Halves(none, none), seen=(), denoised=None)
 
 
+def mean_alone(transport: Transport) -> Transport:
+    """Drop all planes of a transport except its light's mean, for a caller that has its errors already."""
+    light = transport.light
+    return replace(light_alone(transport), light=Halves(light.mean, np.zeros((0, 0, 0, 0), np.float32)))
+
+
 def halves_by_band(
     transport: Transport,
     spectra: Spectra | None = None,

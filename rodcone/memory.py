@@ -49,6 +49,36 @@ class Memory:
 
 
 @dataclass(frozen=True)
+class LightMemory:
+    """Memory of the light in the steps after a render.
+
+    Attributes
+    ----------
+    group_arrays : int
+        Number of float32 arrays (band, h, w) for each light group.
+    lit_arrays : int
+        Number of further such arrays for the light of all groups together.
+    pixel_bytes : float
+        Further bytes per pixel, whatever the number of bands.
+    """
+
+    group_arrays: int
+    lit_arrays: int = 0
+    pixel_bytes: float = 0.0
+
+
+VIEWED = LightMemory(TRANSPORT_ARRAYS, _VIEW_ARRAYS)  # all bands together, by steps that image and judge them
+# Light that goes into a file: the lit light takes the place of the arrays that state the render's error, and the
+# preview's colours take less memory than these arrays did, so that the peak is the end of the render.
+WRITTEN = LightMemory(TRANSPORT_ARRAYS, pixel_bytes=_RENDER_BYTES)
+
+
+def imaged_by_band(group_arrays: int) -> LightMemory:
+    """Return the memory of light that lies in so many arrays per group, for a capture of one band at a time."""
+    return LightMemory(group_arrays, pixel_bytes=_CAPTURE_BYTES)
+
+
+@dataclass(frozen=True)
 class Limit:
     """One bound on memory.
 
@@ -75,7 +105,7 @@ def memory(
     spp: float | None = None,
     denoised: bool = False,
     held: int = 0,
-    light_arrays: int | None = None,
+    light: LightMemory = VIEWED,
 ) -> Memory:
     """Return the memory that a render with `groups` light groups needs, or the steps after it if they need more.
 
@@ -94,9 +124,8 @@ def memory(
         Whether the render is denoised.
     held : int
         Other renders of this size whose light is kept in memory meanwhile.
-    light_arrays : int, optional
-        Number of arrays (band, h, w) per group in which the light is stored, for a capture that images its bands one at
-        a time. If it is left out, the light is a render's, and all bands are viewed together.
+    light : LightMemory
+        Memory of the light in the steps after the render: `VIEWED`, `WRITTEN` or `imaged_by_band`.
     """
     plane = 4.0 * pixels * bands  # bytes of one float32 array (band, h, w)
     per_pixel = _DENOISED_ARRAYS * groups * 4.0 * bands + _DENOISER_BYTES
@@ -110,9 +139,8 @@ def memory(
     drawing = max(_MEANS_ARRAYS * groups * plane + launches * launch, TRANSPORT_ARRAYS * groups * plane)
     drawing += _RENDERER_BYTES + _RENDER_BYTES * pixels
     # Viewing and developing the light; the render is released before the first cell
-    arrays = TRANSPORT_ARRAYS if light_arrays is None else light_arrays
-    viewing = _VIEWER_BYTES + arrays * groups * plane
-    viewing += _VIEW_ARRAYS * plane if light_arrays is None else _CAPTURE_BYTES * pixels
+    viewing = _VIEWER_BYTES + light.group_arrays * groups * plane
+    viewing += light.lit_arrays * plane + light.pixel_bytes * pixels
     rendering = max(drawing * (groups > 0 and spp != 0), viewing) + of_denoiser
     rendering += held * TRANSPORT_ARRAYS * groups * plane
     worker = _WORKER_BYTES + _CELL_BYTES * pixels

@@ -29,7 +29,7 @@ from render.radiance_files.file_checks import (
     require_file,
     require_reflectances,
 )
-from render.spectrum import Spectrum, band_widths, tristimulus
+from render.spectrum import Spectrum, band_widths, row_blocks, tristimulus
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
 from rodcone.errors import InputError, in_place, one_line, read_errors, require_range
 from rodcone.file_keys import require_known
@@ -203,7 +203,7 @@ def write_exr(radiance: SpectralRadiance, path: str | Path, *, scene: str = "") 
     preview, white_cd_m2 = _preview(radiance)
     lamp = radiance.light  # a constant spectrum isn't written, because coloured light has it too, and it has no lines
     channels = {name: np.ascontiguousarray(radiance.values[:, :, k], np.float32) for k, name in enumerate(names)}
-    channels |= {name: np.ascontiguousarray(preview[:, :, k]) for k, name in enumerate("RGB")}
+    channels |= dict(zip("RGB", preview, strict=True))
     header = {
         "compression": OpenEXR.PIZ_COMPRESSION,
         "type": OpenEXR.scanlineimage,
@@ -228,11 +228,14 @@ def write_exr(radiance: SpectralRadiance, path: str | Path, *, scene: str = "") 
 
 
 def _preview(radiance: SpectralRadiance) -> tuple[NDArray[np.float32], float]:
-    """Return linear sRGB (h, w, 3), and the luminance [cd m^-2] at which it is 1."""
+    """Return linear sRGB (3, h, w), and the luminance [cd m^-2] at which it is 1."""
     xyz = tristimulus(radiance.values, radiance.wavelength_nm, radiance.widths_nm, radiance.light)
     white = float(np.percentile(xyz[:, :, 1], PREVIEW_PERCENTILE)) / PREVIEW_AT or 1.0
     white = float(np.clip(white, _FLOAT.tiny, _FLOAT.max))
-    return np.clip(xyz / white @ XYZ_TO_SRGB_ROUNDED.T, 0.0, _HALF_MAX).astype(np.float32), white
+    preview = np.empty((3, *radiance.shape), np.float32)
+    for rows in row_blocks(radiance.shape):
+        preview[:, rows] = np.moveaxis(np.clip(xyz[rows] / white @ XYZ_TO_SRGB_ROUNDED.T, 0.0, _HALF_MAX), -1, 0)
+    return preview, white
 
 
 def exr_holds_reflectance(path: str | Path) -> bool:

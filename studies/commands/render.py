@@ -1,7 +1,7 @@
 """The command `rodcone render`: a scene's light as a file."""
 
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,11 +15,11 @@ from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
 from render.scene import Scene
 from render.spectrum import RENDER_BAND_NM, VISIBLE_NM, even_bands, fine_bands
-from render.transport import Transport
+from render.transport import Transport, mean_alone, relight_by_band
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError
 from rodcone.files import check_place, require_ending
-from rodcone.memory import require_memory
+from rodcone.memory import VIEWED, WRITTEN, require_memory
 from rodcone.progress import compile_note, progress, render_words
 from rodcone.types import Floats
 from studies.commands.console import INTERRUPTED, Seconds, announce_cost, print_result, say
@@ -165,6 +165,7 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, dry_run: bool 
         _WRITE_S,
         denoised=order.denoise,
         max_seconds=order.max_seconds,
+        light=VIEWED if order.denoise else WRITTEN,
     )
     if not announce_cost(cost, dry_run=dry_run, json=json):
         return 0
@@ -179,9 +180,15 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, dry_run: bool 
             transport = _rendered(order, scene, size, (wavelength_nm, width_nm), kept)
             notes = opened.notes
             notes = (*notes, *filter(None, [compile_note(transport.compile_s)]))
-        radiance = (
-            relight_denoised(transport, spectra, **lit_at)[0] if order.denoise else transport.relight(spectra, **lit_at)
-        )
+        band_error = max(transport.band_error(spectra).values())
+        if order.denoise:
+            radiance = relight_denoised(transport, spectra, **lit_at)[0]
+        else:
+            by_band = relight_by_band(transport, spectra, **lit_at)
+            # The lit light, which is one more array of all bands, takes the place of those that state the error.
+            del ready
+            transport = mean_alone(transport)
+            radiance = replace(by_band, signed=False).whole()
         write_exr(radiance, order.out, scene=scene.name)
     # Say what was done.
     say(*notes)
@@ -189,7 +196,7 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, dry_run: bool 
     if interrupted:
         say(f"stopped; {transport.spp:.0f} samples a pixel are kept in {order.out}")
     facts = {"path": str(order.out), **_facts(opened, transport, radiance)}
-    facts["largest_band_error"] = max(transport.band_error(spectra).values())
+    facts["largest_band_error"] = band_error
     print_result(order.out, facts, json=json)
     return INTERRUPTED if interrupted else 0
 

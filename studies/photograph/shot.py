@@ -29,7 +29,7 @@ from render.transport import Transport, halves_by_band, light_alone, relight_by_
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_absent, require_fields
 from rodcone.files import check_place
-from rodcone.memory import require_memory
+from rodcone.memory import VIEWED, LightMemory, imaged_by_band, require_memory
 from rodcone.progress import Step, compile_note, render_words
 from rodcone.time_text import parse_time
 from rodcone.types import Floats
@@ -608,9 +608,9 @@ def check(order: Order) -> Checked:
             )
         check_radiance_file(order.source, () if order.level is None else (order.level,))
         pixels, bands, groups = extent_of(order.source)
-        arrays = _light_arrays(order, sensor, 0 if comes_by_band(order.source) else _FILE_ARRAYS)
+        light = _light_memory(order, sensor, 0 if comes_by_band(order.source) else _FILE_ARRAYS)
         after_s, band_s = _after_s(sensor)
-        cost = PictureCost((1, pixels), bands, groups, 0, after_s, light_arrays=arrays, band_s=band_s)
+        cost = PictureCost((1, pixels), bands, groups, 0, after_s, light=light, band_s=band_s)
         return Checked(order, sensor, None, exposure_s, None, 1, cost, flicker_of(order.flicker, ()))
     # A scene, rendered or there already.
     opened, moving, shares = _opened(order, exposure_s, sensor)
@@ -644,7 +644,7 @@ def check(order: Order) -> Checked:
         after_s,
         through=through,
         times=times,
-        light_arrays=_light_arrays(
+        light=_light_memory(
             order, sensor, _arrays_while_imaged(prod(rendered), centres.size, len(opened.scene.groups))
         ),
         band_s=band_s,
@@ -662,12 +662,12 @@ def _arrays_while_imaged(pixels: int, bands: int, groups: int) -> int:
     return 0 if _lies_in_files(4.0 * pixels * bands * groups) else _HALVES
 
 
-def _light_arrays(order: Order, sensor: SensorConfig, arrays: int) -> int | None:
-    """Return `arrays`, the number of all-band arrays in memory, if bands are imaged one at a time; otherwise None.
+def _light_memory(order: Order, sensor: SensorConfig, arrays: int) -> LightMemory:
+    """Return the memory of a light of which `arrays` arrays of all bands per group exist if it is imaged by band.
 
     Bands are imaged together behind a lens that doesn't spread light, and under lamps that flicker.
     """
-    return arrays if spreads(sensor.lens) and not order.flicker else None
+    return imaged_by_band(arrays) if spreads(sensor.lens) and not order.flicker else VIEWED
 
 
 def _after_s(sensor: SensorConfig) -> tuple[float, float]:

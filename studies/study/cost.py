@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from render.limits import PILOT_FROM
-from rodcone.memory import GB, Memory, memory
+from rodcone.memory import GB, VIEWED, LightMemory, Memory, memory
 from rodcone.progress import duration
 
 START_S = 1.3  # imports of a process
@@ -57,8 +57,8 @@ class PictureCost:
         The lens that the scene is rendered through, in words; empty for a pinhole.
     times : int
         Number of renders that are averaged for a scene that moves, each with `spp` samples per pixel.
-    light_arrays : int, optional
-        Number of all-band arrays of a light whose bands are imaged one at a time, as in `rodcone.memory.memory`.
+    light : LightMemory
+        Memory of the light in the steps after the render, as in `rodcone.memory.memory`.
     band_s : float
         Processor seconds per band of those steps after the light that don't depend on the number of pixels.
     """
@@ -72,7 +72,7 @@ class PictureCost:
     max_seconds: float | None = None
     through: str = ""
     times: int = 1
-    light_arrays: int | None = None
+    light: LightMemory = VIEWED
     band_s: float = 0.0
 
     @property
@@ -86,13 +86,7 @@ class PictureCost:
         groups = self.groups if self.spp != 0 else 1
         mean = int(self.times > 1)  # the mean light of the earlier times
         return memory(
-            self.pixels,
-            self.bands,
-            groups,
-            spp=self.spp,
-            denoised=self.denoised,
-            held=mean,
-            light_arrays=self.light_arrays,
+            self.pixels, self.bands, groups, spp=self.spp, denoised=self.denoised, held=mean, light=self.light
         )
 
     @property

@@ -1,5 +1,8 @@
 """Spectra: exact averages of linear pieces, and one-line complaints about bad points and bands."""
 
+import tracemalloc
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,10 +21,12 @@ from render.spectrum import (
     band_widths,
     black_body,
     colour_matching_functions,
+    even_bands,
     flat,
     line_bands,
     line_spectrum,
     luminance,
+    observer_weights,
     photons_per_joule,
     tristimulus,
 )
@@ -231,6 +236,21 @@ def test_luminance_is_linear_and_takes_the_last_axis():
     assert result.shape == (2, 3)
     assert result[1, 2] == pytest.approx(luminance(spectral[1, 2], DEFAULT_WAVELENGTH_NM, WIDTH_NM), rel=1e-14)
     assert luminance(4 * spectral, DEFAULT_WAVELENGTH_NM, WIDTH_NM) == pytest.approx(4 * result, rel=1e-14)
+
+
+@loop("function", [luminance, tristimulus])
+def test_a_picture_summed_in_parts_has_the_bits_of_all_at_once_without_a_copy_of_its_bands(function: Any) -> None:
+    nm, width_nm = even_bands((380.0, 780.0), 8)
+    planes = np.random.default_rng(4).random((nm.size, 1201, 599), dtype=np.float32)
+    weights = observer_weights(nm, width_nm)
+    spectral = np.moveaxis(planes, 0, -1)
+    at_once = LUMINOUS_EFFICACY_LM_W * (spectral @ (weights[1] if function is luminance else weights.T))
+    tracemalloc.start()
+    made = function(spectral, nm, width_nm)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert np.array_equal(made, at_once)
+    assert peak - made.nbytes < planes.nbytes / 2
 
 
 def test_luminance_of_equal_energy_does_not_depend_on_the_cut_into_bands():

@@ -13,10 +13,10 @@ import pytest
 from command_line import COST, call, check_refusals
 from PIL import Image
 
-from rodcone.memory import Limit, file_extent, memory, memory_limits
+from rodcone.memory import VIEWED, WRITTEN, Limit, file_extent, imaged_by_band, memory, memory_limits
 
 COMMANDS = {
-    "render": ["render", "still_life", "--height", "4000", "--width", "4000", "-o", "out/picture.exr"],
+    "render": ["render", "still_life", "--height", "4400", "--width", "4400", "-o", "out/picture.exr"],
     "capture": ["capture", "still_life", "--size", "4400", "-o", "out/shot.dng"],
     "demo": ["demo", "--size", "4000", "-o", "out"],
     "sweep": ["sweep", "study.toml", "--workers", "1", "-o", "out"],
@@ -133,21 +133,34 @@ def test_a_render_and_what_follows_it_count_by_their_arrays() -> None:
 def test_a_scene_of_12_mpx_is_captured_in_under_4_gb_whose_peak_is_the_end_of_its_render() -> None:
     """Three arrays of 20 bands of one light group, some 45 bytes per pixel, and libraries."""
     pixels = 4000 * 3000
-    needed = memory(pixels, 20, 1, spp=64, light_arrays=0).total
+    needed = memory(pixels, 20, 1, spp=64, light=imaged_by_band(0)).total
     assert needed == pytest.approx(3 * 4 * 20 * pixels + 45 * pixels + 0.22e9, rel=0.01)
     assert needed < 4e9
-    drawing = memory(2_000_000, 20, 1, spp=64, light_arrays=0).total
+    drawing = memory(2_000_000, 20, 1, spp=64, light=imaged_by_band(0)).total
     assert drawing == pytest.approx(2 * 4 * 20 * 2e6 + 45 * 2e6 + 7.5 * (4 << 24) + 0.22e9, rel=0.01)
+
+
+def test_light_of_12_mpx_is_written_in_under_4_gb_whose_peak_is_the_end_of_its_render_too(tmp_path: Path) -> None:
+    scene = Path(__file__).parents[2] / "benchmarks/box.xml"
+    size = ["--width", "4000", "--height", "3000"]
+    asked = ["render", str(scene), *size, "-o", str(tmp_path / "a.exr"), "--dry-run", "--json"]
+    code, told, _ = call(asked)
+    assert code == 0
+    assert json.loads(told)["bytes"] == memory(4000 * 3000, 20, 1, spp=64, light=WRITTEN).total
+    assert json.loads(told)["bytes"] == pytest.approx((3 * 4 * 20 + 45) * 4000 * 3000 + 0.22e9, rel=0.01)
+    # Denoised light isn't written by band.
+    denoised = json.loads(call([*asked, "--denoise"])[1])["bytes"]
+    assert denoised > memory(4000 * 3000, 20, 1, spp=64).total
 
 
 def test_a_capture_counts_its_light_and_what_each_pixel_takes_once() -> None:
     pixels = 4000 * 3000
     scene, photograph = (
-        memory(pixels, bands, 1, spp=0, light_arrays=arrays).total for bands, arrays in ((20, 2), (40, 0))
+        memory(pixels, bands, 1, spp=0, light=imaged_by_band(arrays)).total for bands, arrays in ((20, 2), (40, 0))
     )
     assert scene - photograph == 2 * 4 * 20 * pixels
     assert photograph < 3e9, "a photograph's bands are never held together"
-    assert photograph == memory(pixels, 20, 1, spp=0, light_arrays=0).total
+    assert photograph == memory(pixels, 20, 1, spp=0, light=imaged_by_band(0)).total
 
 
 def test_a_picture_file_counts_by_its_bytes_and_needs_no_render(tmp_path: Path) -> None:
@@ -200,9 +213,9 @@ def peak_of(arguments: list[str], folder: Path) -> int:
 @pytest.mark.parametrize("name", MEASURED)
 def test_a_run_needs_no_more_than_its_estimate_which_is_at_most_1_4_times_it(name: str, tmp_path: Path) -> None:
     arguments, pixels, bands, groups, spp = MEASURED[name]
-    light_arrays = 2 if arguments[0] == "capture" else None
     denoised = "--denoise" in arguments
-    estimated = memory(pixels, bands, groups, spp=spp, denoised=denoised, light_arrays=light_arrays).total
+    light = imaged_by_band(2) if arguments[0] == "capture" else VIEWED if denoised else WRITTEN
+    estimated = memory(pixels, bands, groups, spp=spp, denoised=denoised, light=light).total
     # The first run may compile its kernels, which takes up to 3 MB a band more and isn't estimated.
     least, most = sorted(peak_of(arguments, tmp_path) for _ in range(2))
     print(f"{name}: estimated {estimated / 1e9:.2f} GB, peaks {least / 1e9:.2f} and {most / 1e9:.2f} GB")
@@ -213,7 +226,7 @@ def test_a_run_needs_no_more_than_its_estimate_which_is_at_most_1_4_times_it(nam
 def test_a_large_photograph_needs_no_more_than_its_estimate_which_is_at_most_1_35_times_it(tmp_path: Path) -> None:
     pixels = np.random.default_rng(1).integers(60, 200, (1224, 1632, 3), dtype=np.uint8)
     Image.fromarray(pixels).save(tmp_path / "a.png")
-    estimated = memory(1224 * 1632, 40, 1, spp=0, light_arrays=0).total
+    estimated = memory(1224 * 1632, 40, 1, spp=0, light=imaged_by_band(0)).total
     peak = peak_of(["capture", "a.png", "-o", "a.dng"], tmp_path)
     print(f"estimated {estimated / 1e9:.2f} GB, peak {peak / 1e9:.2f} GB, ratio {estimated / peak:.2f}")
     assert 1.0 <= estimated / peak < 1.35

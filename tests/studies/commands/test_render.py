@@ -2,6 +2,7 @@
 
 import json
 import re
+import tracemalloc
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -9,11 +10,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders import transport_of
 from command_line import call, check_refusals
 
 from render.illuminants import illuminant
-from render.radiance_files.exr import read_exr
+from render.radiance_files.exr import read_exr, write_exr
+from render.scene import LightGroup
+from render.spectrum import even_bands
+from render.transport import Transport
+from scenes.catalogue import load
 from studies.commands import render as render_command
+from studies.photograph.ready_light import Ready
+from studies.study.lit_scene import asked_spectra
 
 BANDS = ["--bands", "400:720:80"]
 QUICK = ["--spp", "8", *BANDS]
@@ -93,6 +101,57 @@ def test_a_catalogue_scene_is_rendered_by_name(tmp_path: Path) -> None:
     arguments = ["flat_field", "-o", str(out), "--height", "2", "--width", "3", "--level", "500lux", *QUICK]
     assert call(["render", *arguments])[:2] == (0, f"{out}\n")
     assert read_exr(out).shape == (2, 3)
+
+
+@pytest.mark.parametrize("lit", [(), ("--light", "F11"), ("--light", "F11", "--level", "3cd/m2")])
+def test_the_file_has_the_bytes_of_light_that_is_relit_with_all_bands_at_once(
+    lit: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rendered, made = render_command.render_transport, []
+
+    def kept(*arguments: Any, **options: Any) -> Transport:
+        made.append(rendered(*arguments, **options))
+        return made[0]
+
+    monkeypatch.setattr(render_command, "render_transport", kept)
+    out = tmp_path / "box.exr"
+    asked = ["render", "cornell_box", "-o", str(out), "--width", "24", "--spp", "8", "--json", *lit]
+    code, printed, _ = call(asked)
+    spectra = asked_spectra(load("cornell_box"), lit[1:2])
+    at_once = made[0].relight(spectra, luminance_cd_m2=3.0 if "--level" in lit else None)
+    write_exr(at_once, tmp_path / "at_once.exr", scene="cornell_box")
+    assert code == 0
+    assert out.read_bytes() == (tmp_path / "at_once.exr").read_bytes()
+    facts = json.loads(printed)
+    assert facts["relative_mc_error"] == at_once.relative_mc_error > 0
+    assert facts["relative_level_error"] == at_once.relative_level_error
+    assert facts["mean_luminance_cd_m2"] == at_once.luminance().mean()
+    assert facts["largest_band_error"] == max(made[0].band_error(spectra).values())
+
+
+@pytest.mark.parametrize("stored", [False, True])
+def test_light_is_written_in_the_memory_that_its_render_holds_at_its_end(
+    stored: bool, scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three arrays of all bands: mean, half difference and variance."""
+    shape = (2, 20, 400, 500)
+    groups = {name: LightGroup((name,), illuminant("E"), 1.0) for name in ("sun", "sky")}
+    bands = even_bands((380.0, 780.0), 20)
+
+    def ended(*_: Any, **__: Any) -> Transport:
+        tracemalloc.start()  # here, because what the command imports counts too
+        return transport_of(np.random.default_rng(1).random(shape, dtype=np.float32), groups, *bands)
+
+    monkeypatch.setattr(render_command, "render_transport", ended)
+    if stored:
+        monkeypatch.setattr(render_command, "find_ready", lambda *_: Ready(ended(), shape[2:], "light: ready"))
+    for _ in range(2):  # the first run computes tables that stay
+        code, _, err = call(["render", str(scene), "-o", str(tmp_path / "o.exr")])
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+    assert (code, "light: ready" in err) == (0, stored)
+    print(peak / (4*np.prod(shape)))
+    assert peak < 3.2 * 4 * np.prod(shape)
 
 
 def test_what_an_interrupt_left_is_written_and_told(scene, tmp_path, monkeypatch):
