@@ -25,7 +25,7 @@ from PIL import Image
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
 from render.spectrum import VISIBLE_NM, even_bands
-from rodcone.memory import memory
+from rodcone.memory import WRITTEN, memory
 
 SIDES = 256, 512, 1024  # 0.07, 0.26 and 1 Mpx
 LARGE = 3464  # 12 Mpx
@@ -54,7 +54,7 @@ def main() -> None:
             found = costs(given.scene, side, Path(folder))
             print(row(side, *found), flush=True)
     times = (seconds * (LARGE / side) ** 2 for seconds in found[:3])
-    print(row(LARGE, *times, memory(LARGE**2, BANDS, 1, spp=SAMPLES).total) + " computed")
+    print(row(LARGE, *times, memory(LARGE**2, BANDS, 1, spp=SAMPLES, light=WRITTEN).total) + " computed")
 
 
 def stored(megapixels: list[float]) -> None:
