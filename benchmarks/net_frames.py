@@ -1,6 +1,7 @@
 r"""Frames to train the network of `corrected_ple` on: pictures that judge nothing, developed by `ple`.
 
     python benchmarks/net_frames.py out/net --groups 40        (a group: one camera and lamp, both mosaics)
+    python benchmarks/net_frames.py out/net --photographs out/photographs         (of net_photographs.py)
 
 A frame holds what the network sees, and its target: exact R, G and B of the picture by the camera's own matrix, as
 encoded sRGB over the picture's white. So the network isn't taught colours, which a matrix has to choose.
@@ -8,16 +9,19 @@ encoded sRGB over the picture's white. So the network isn't taught colours, whic
 Pictures are drawn, leaves and gratings of drawn reflectances, or photographs that `ple`'s prior was trained on, whose
 colours become surfaces' spectra; those without colour get two drawn surfaces at their ends. Read noise is 0.7 to 6 e-,
 pitch 0.8 to 3 um, light 0.02 to 1000 cd/m^2, the lens sharp to soft; lamps are those of `draw_illuminant`. `HELD` is a
-photograph left out to validate on.
+photograph left out to validate on, beside those of a folder that `is_held` names.
 """
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from corrected_ple import correction_inputs
+from net_photographs import is_held, mean_of_squares
 from numpy.typing import NDArray
+from PIL import Image
 from scipy.ndimage import gaussian_filter
 from skimage import data
 
@@ -46,7 +50,8 @@ LONGEST_S = 0.066
 LAMPS = ("D65", "D65", "A", "LED-B3")  # half of the groups, the others' are drawn
 # Of a group's pictures in turn; those of a kind that is drawn are parts of one picture.
 KINDS = ("photograph",) * 6 + ("gratings", "leaves")
-HELD_KINDS = ("leaves", HELD, "gratings", HELD)
+HELD_KINDS = ("leaves", "photograph", "gratings", "photograph")
+COARSEST = 8  # side of a pixel of a frame in those of a folder's photograph, at most; its least is 2
 HELD_CD_M2 = (0.05, 0.5, 5.0, 100.0)
 NEAR = 2.0  # by which a group's light differs at most, so that it shares `ple`'s tables
 MOSAICS = ("rgbw", "bayer")
@@ -90,29 +95,41 @@ def collected(sensor: SensorConfig, lamp: str, nm: Floats) -> Floats:
 
 
 def draw_signals(
-    rng: np.random.Generator, sensor: SensorConfig, lamp: str, kind: str, drawn: dict[str, Floats]
+    rng: np.random.Generator, sensor: SensorConfig, lamp: str, source: str | Path, drawn: dict[str, Floats]
 ) -> Floats:
     """Draw a picture as signals of R, G, B and W over those of white, shape (CROP, CROP, 4)."""
-    if kind in DRAWN:
+    if source in DRAWN:
+        kind = str(source)
         if kind not in drawn:
             drawn[kind] = DRAWN[kind](rng, KnownLight(collected(sensor, lamp, NM)))
         picture = drawn[kind]
     else:
-        name = HELD if kind == HELD else str(rng.choice([name for name in PHOTOGRAPHS if name != HELD]))
-        picture = photograph_signals(rng, sensor, lamp, name)
+        picture = photograph_signals(rng, sensor, lamp, read_reduced(rng, source))
     top, left = (int(rng.integers(length - CROP + 1)) for length in picture.shape[:2])
     picture = np.rot90(picture[top : top + CROP, left : left + CROP], rng.integers(4))
     return np.maximum(gaussian_filter(picture, (*[rng.uniform(0.0, 0.6)] * 2, 0)), 1e-4)
 
 
-def photograph_signals(rng: np.random.Generator, sensor: SensorConfig, lamp: str, name: str) -> Floats:
-    """Photograph at a part of its size, as signals of R, G, B and W, with a brightness and tint of its own."""
-    encoded = getattr(data, name)() / 255.0
-    most = min(min(encoded.shape[:2]) // CROP, 3)
+def photographs_of(folder: Path | None, held: bool) -> list[str | Path]:
+    """Return the photographs to train on, or those to validate on: scikit-image's names, and a folder's paths."""
+    paths = sorted(folder.glob("*.png")) if folder else []
+    names = (name for name in PHOTOGRAPHS if (name == HELD) == held)
+    return [*names, *(path for path in paths if is_held(path.stem) == held)]
+
+
+def read_reduced(rng: np.random.Generator, source: str | Path) -> Floats:
+    """Read a photograph in linear sRGB at a part of its size: scikit-image's whole, a folder's cut to a frame."""
+    encoded = getattr(data, source)() if isinstance(source, str) else np.asarray(Image.open(source).convert("RGB"))
+    most = min(min(encoded.shape[:2]) // CROP, 3 if isinstance(source, str) else COARSEST)
     step = int(rng.integers(min(2, most), most + 1))
-    linear = decode_srgb(encoded)
-    height, width = (size // step for size in linear.shape[:2])
-    linear = linear[: height * step, : width * step].reshape(height, step, width, step, -1).mean(axis=(1, 3))
+    if not isinstance(source, str):
+        top, left = (int(rng.integers(length - CROP * step + 1)) for length in encoded.shape[:2])
+        encoded = encoded[top : top + CROP * step, left : left + CROP * step]
+    return mean_of_squares(decode_srgb(encoded / 255.0), step)
+
+
+def photograph_signals(rng: np.random.Generator, sensor: SensorConfig, lamp: str, linear: Floats) -> Floats:
+    """Return a photograph as signals of R, G, B and W, with a brightness and tint of its own."""
     if linear.shape[-1] == 1:
         share = linear / linear.max()
         ends = [draw_surface(rng) for _ in range(2)]
@@ -156,7 +173,7 @@ def take(
     return frames
 
 
-def draw_group(folder: Path, index: int, held: bool) -> None:
+def draw_group(folder: Path, index: int, held: bool, photographs: Sequence[str | Path]) -> None:
     """Draw a group's frames by one camera and lamp, and write both mosaics' files."""
     rng = np.random.default_rng([64, index, int(held)])
     camera = low_noise() if held else draw_camera(rng)
@@ -165,10 +182,11 @@ def draw_group(folder: Path, index: int, held: bool) -> None:
     kinds = HELD_KINDS if held else KINDS
     levels = HELD_CD_M2 if held else np.exp(middle + rng.uniform(-np.log(NEAR), np.log(NEAR), len(kinds)))
     drawn: dict[str, Floats] = {}
-    found = [
-        take(rng, camera, lamp, kind, draw_signals(rng, camera, lamp, kind, drawn), float(level))
-        for kind, level in zip(kinds, levels, strict=True)
-    ]
+    found = []
+    for kind, level in zip(kinds, levels, strict=True):
+        source = photographs[int(rng.integers(len(photographs)))] if kind == "photograph" else kind
+        signals = draw_signals(rng, camera, lamp, source, drawn)
+        found.append(take(rng, camera, lamp, Path(source).stem, signals, float(level)))
     for mosaic, frames in zip(MOSAICS, zip(*found, strict=True), strict=True):
         arrays = {name: np.array([getattr(frame, name) for frame in frames]) for name in Frame.__dataclass_fields__}
         np.savez(folder / f"{'held' if held else 'train'}_{mosaic}_{index:04}.part.npz", **arrays)
@@ -183,13 +201,14 @@ def main() -> None:
     parser.add_argument("--groups", type=int, default=100, help="of eight pictures")
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--held", type=int, default=0, help="groups to validate on")
+    parser.add_argument("--photographs", type=Path, help="folder of PNG to draw from beside scikit-image's photographs")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     work = [(index, True) for index in range(given.held)]
     work += [(index, False) for index in range(given.first, given.first + given.groups)]
     for index, held in work:
         if not (given.folder / f"{'held' if held else 'train'}_bayer_{index:04}.npz").exists():
-            draw_group(given.folder, index, held)
+            draw_group(given.folder, index, held, photographs_of(given.photographs, held))
             print(f"group {index}{', held' if held else ''}", flush=True)
 
 

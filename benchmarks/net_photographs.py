@@ -89,6 +89,13 @@ def upright_srgb(content: bytes, longest: int = LONGEST) -> Image.Image:
     return image
 
 
+def mean_of_squares(linear: Floats, step: int) -> Floats:
+    """Average squares of `step` pixels a side; what is left over at the right and the bottom is cut off."""
+    height, width = (size // step for size in linear.shape[:2])
+    squares = linear[: height * step, : width * step].reshape(height, step, width, step, -1)
+    return np.asarray(squares.mean(axis=(1, 3)))
+
+
 def read_linear(folder: Path) -> Iterator[tuple[str, Floats]]:
     """Read a folder's photographs one by one: name and linear sRGB (h, w, 3), 0 to 1."""
     for path in sorted(folder.glob("*.png")):
