@@ -77,7 +77,7 @@ def read_original(clones: Path, photograph: NetPhotograph) -> bytes:
 
 def upright_srgb(content: bytes, longest: int = LONGEST) -> Image.Image:
     """Decode a file as 8-bit sRGB, reduced by the least power of two that fits."""
-    image = Image.open(io.BytesIO(content))
+    image: Image.Image = Image.open(io.BytesIO(content))
     step = 1 << max(0, (max(image.size) - 1) // longest).bit_length()
     width, height = (size // step for size in image.size)
     image.draft("RGB", (width, height))  # JPEG's decoder reduces by itself, and reads the less
