@@ -123,8 +123,11 @@ class WhiteReading:
         `sensor.cfa.channels`.
     guide : (h, w) float
         What W would read at every pixel [standard deviations of the noise of a sample of W].
+    lines : (rows, columns) float
+        Certainty, 0 to 1, that grey lines two pixels apart make the colour that the samples of a tile show.
     """
 
     raw: RawImage
     shares: NDArray[np.floating]
     guide: NDArray[np.floating]
+    lines: NDArray[np.floating]

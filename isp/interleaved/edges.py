@@ -97,10 +97,13 @@ def sharpen(
 
     A wall beside a window has contrast too, but its planes average many samples, so that G is small.
 
+    Of grey lines two pixels apart, the planes show a colour. As far as such lines are certain, by the weight p of
+    `.panchromatic`, the result is L: F'''_c = F''_c + p (L_c - F''_c).
+
     Parameters
     ----------
     white : WhiteReading
-        The frame, and the shares u.
+        The frame, the shares u, and the weight p.
     planes : (h, w, 4) float
         R, G, B and W of `isp.interleaved.reconstruction.reconstruct` [e-].
     gains : (4,) float64
@@ -111,7 +114,7 @@ def sharpen(
     Returns
     -------
     (h, w, 4) float32
-        R, G, B and W, F'' [e-].
+        R, G, B and W, F''' [e-].
     """
     raw = white.raw
     nu = 1.0 / (1.0 / np.maximum(noise_gain, TINY)).mean(axis=0).mean(axis=0)
@@ -123,11 +126,12 @@ def sharpen(
     padded = np.pad(planes.astype(np.float64), (*border, (0, 0)), mode="reflect")
     electrons, sites = (np.pad(values, border, mode="reflect") for values in (raw.electrons, site))
     parts = list[Floats]()
-    shares = at_pixels(white.shares, raw).astype(np.float64)
+    of_tiles = np.concatenate([white.shares, white.lines[..., None]], axis=2)
+    tiles = at_pixels(of_tiles, raw).astype(np.float64)
     for own in strips(raw.shape[0], STRIP_ROWS):
         rows = slice(own.start, own.stop + 2 * FAR)
         around = padded[rows], electrons[rows], sites[rows]
-        parts.append(_sharpen(raw, gains, nu, shares[own], noise_gain[own], *around))
+        parts.append(_sharpen(raw, gains, nu, tiles[own], noise_gain[own], *around))
     return np.concatenate(parts).astype(np.float32)
 
 
@@ -135,12 +139,15 @@ def _sharpen(
     raw: RawImage,
     gains: Floats,
     nu: Floats,
-    shares: Floats,
+    tiles: Floats,
     noise_gain: NDArray[np.floating],
     planes: Floats,
     *samples: NDArray[Any],
 ) -> Floats:
-    """Sharpen in double precision (`.kernel.edges` uses single); planes and samples reach `FAR` pixels further."""
+    """Sharpen in double precision (`.kernel.edges` uses single); planes and samples reach `FAR` pixels further.
+
+    `tiles` holds u and p.
+    """
     far = sliding_window_view(planes, (2 * FAR + 1,) * 2, axis=(0, 1))[..., ::STEP, ::STEP]
     middle = slice(FAR - REACH, REACH - FAR)
     planes, electrons, sites = (values[middle, middle] for values in (planes, *samples))
@@ -216,7 +223,7 @@ def _sharpen(
 
     # F'': light that fills less than two fifths of the window, from the pixel's own sample; L is `small`.
     no_hue = is_full[..., 4] & (is_full & (site != 3)).any(axis=2)
-    shares = np.where(no_hue[..., None], gains[3] / gains, shares)
+    shares = np.where(no_hue[..., None], gains[3] / gains, tiles[..., :4])
     own = np.take_along_axis(shares, site[..., 4:5], axis=2)[..., 0]
     of_w, here = plane[..., 3], site[..., 4]
     as_white_noise = np.maximum((shot[here] * np.maximum(of_w, 0.0) + dark[here] / own) / own, TINY)
@@ -224,4 +231,5 @@ def _sharpen(
     seen = np.maximum(1.0 - APART * as_white_noise / np.maximum(difference**2, TINY), 0.0)
     small = (of_w + seen * difference)[..., None] * shares
     few = np.minimum(FEW * noise_gain.max(axis=2, keepdims=True), 1.0)
-    return np.asarray(sharp + few * (1.0 - 1.0 / (1.0 + (contrast / SMALL) ** 4)) * (small - sharp))
+    sharp += few * (1.0 - 1.0 / (1.0 + (contrast / SMALL) ** 4)) * (small - sharp)
+    return np.asarray(sharp + tiles[..., 4:] * (small - sharp))

@@ -21,7 +21,10 @@ from isp.interleaved.kernel.panchromatic import (
     FAINT,
     LEAST_LIGHT,
     LEAST_SHARE,
+    LINE_CONTRAST,
+    OTHER_PATTERNS,
     guide_frame,
+    line_signs,
     surroundings_steps,
     tent_radii,
     window_steps,
@@ -56,6 +59,16 @@ def read_as_white(raw: RawImage, neutral: Floats) -> WhiteReading:
 
         m_c -= a_c min(1, 1 / chi^2),    chi^2 = sum_c a_c^2 / (s_c^2 + q_c^2 s_W^2).
 
+    Before this, grey lines two pixels apart are subtracted, of which each channel of a 2 x 2 tile samples one phase, so
+    that they look like a colour (docs/decisions/0065-lines-in-the-guide.md). With w_c = m_c / q_c, the four channels
+    show A = sum_c w_c / 4 and three patterns b_k = sum_c s_k(c) w_c / 4, where s_k is +1 or -1: upright lines, lying
+    lines, and a checkerboard. Hardly any real colour shows lines alone, because W sees the light of R, G and B. With
+    V = sum_c s_c^2 / (16 q_c^2), the lines k, upright or lying, count by
+
+        p_k = [1 - (b_1^2 + b_2^2 + b_3^2 - b_k^2) / (0.3 b_k^2)] min(1, (|b_k| / A - 0.3) / 0.15) [1 - V / b_k^2],
+
+    where each factor is at least 0, and p_k s_k(c) b_k q_c is subtracted from m_c.
+
     Where m_W is below 0.3, light is too faint to show a colour. Therefore a neutral's (0.3 - m_W) n_c is added to m_c,
     and likewise to f_c. The ratio is then r_c = m_c / m_W, but at least 0.02 n_c.
 
@@ -77,8 +90,8 @@ def read_as_white(raw: RawImage, neutral: Floats) -> WhiteReading:
     ratios = np.asarray(neutral, np.float64) / neutral[white]
     raw = with_full_white(raw, ratios)
     if backend() == "numpy":
-        shares, guide_e = _read_numpy(raw, ratios, white)
-        return WhiteReading(raw, shares, stabilise_channel(guide_e, raw, raw.channels[white]))
+        shares, guide_e, lines = _read_numpy(raw, ratios, white)
+        return WhiteReading(raw, shares, stabilise_channel(guide_e, raw, raw.channels[white]), lines)
     return WhiteReading(raw, *guide_frame(raw, ratios, white))
 
 
@@ -125,8 +138,11 @@ def _comb(steps: range) -> Floats:
     return np.asarray(weights / weights.sum())
 
 
-def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floats]:
-    """Compute the surroundings' shares and the guide [e-] in double precision; `.kernel.panchromatic` uses single."""
+def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floats, Floats]:
+    """Compute the surroundings' shares, the guide [e-] and the weight of lines.
+
+    This form uses double precision, `.kernel.panchromatic` single.
+    """
     site = np.argmax([mask(raw.cfa, name, raw.shape) for name in raw.channels], axis=0)
     shot, dark, _ = channel_noise(raw)
     electrons = raw.electrons
@@ -158,12 +174,13 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
     far = np.maximum(_mean(means, _comb(surroundings_steps(down)), _comb(surroundings_steps(across))), 0.0)
     far += np.maximum(LEAST_LIGHT - far[..., white, None], 0.0) * ratios
     share = far / far[..., white, None]
+    surroundings = np.maximum(share, LEAST_SHARE * ratios)
+    means, lines = _without_lines(means, error, surroundings, line_signs(raw))
     away = means - share * means[..., white, None]
     chi_squared = (away**2 / np.maximum(error + share**2 * error[..., white, None], TINY)).sum(axis=2, keepdims=True)
     means = np.maximum(means - away * np.minimum(1.0 / np.maximum(chi_squared, TINY), 1.0), 0.0)
     means += np.maximum(LEAST_LIGHT - means[..., white, None], 0.0) * ratios
     shares = np.maximum(means / means[..., white, None], LEAST_SHARE * ratios)
-    surroundings = np.maximum(share, LEAST_SHARE * ratios)
 
     # v of the sample itself, and t, the mean of v over the eight samples around it.
     own = np.take_along_axis(at_pixels(shares, raw), site[..., None], axis=-1)[..., 0]
@@ -183,7 +200,23 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
     inverse = 1.0 / (own_variance + around_variance)
     detail = np.maximum(_box(difference**2 * inverse, DETAIL_PX) - 1.0, 0.0) / _box(inverse, DETAIL_PX)
     trusted = detail + around_variance
-    return surroundings, around + trusted / (trusted + own_variance) * difference
+    return surroundings, around + trusted / (trusted + own_variance) * difference, lines
+
+
+def _without_lines(means: Floats, error: Floats, around: Floats, signs: Floats | None) -> tuple[Floats, Floats]:
+    """Subtract from the channels' means what grey lines two pixels apart would show, and return their weight too."""
+    if signs is None:
+        return means, np.zeros(means.shape[:2])
+    as_white = means / around
+    level = np.maximum(as_white.mean(axis=2), TINY)[..., None]
+    variance = (error / around**2).sum(axis=2, keepdims=True) / 16.0
+    patterns = as_white @ signs.T / 4.0
+    lines = patterns[..., :2]
+    square = np.maximum(lines**2, TINY)
+    alone = 1.0 - ((patterns**2).sum(axis=2, keepdims=True) - square) / (OTHER_PATTERNS * square)
+    clear = np.minimum((np.abs(lines) / level - LINE_CONTRAST[0]) / np.ptp(LINE_CONTRAST), 1.0)
+    weights = np.maximum(alone, 0.0) * np.maximum(clear, 0.0) * np.maximum(1.0 - variance / square, 0.0)
+    return means - around * ((weights * lines) @ signs[:2]), weights.max(axis=2)
 
 
 def at_pixels(shares: NDArray[np.floating], raw: RawImage) -> NDArray[Any]:

@@ -61,7 +61,7 @@ def sharpen_frame(
     down, across = (np.uint32(length) for length in (len(raw.cfa), len(raw.cfa[0])))
     # Rows and columns are mirrored at the borders; row r stands at FAR + r.
     rows, columns = (np.pad(np.arange(length, dtype=np.uint32), FAR, mode="reflect") for length in raw.shape)
-    frame, noise_gains, share_planes = upload(planes), upload(noise_gain), upload(white.shares)
+    frame, noise_gains, share_planes, certain = (upload(x) for x in (planes, noise_gain, white.shares, white.lines))
     electrons = upload((raw.dn.astype(np.float32) - np.float32(raw.black_dn)) * np.float32(raw.gain_e_per_dn))
     cells = upload(np.array([[names.index(name) for name in line] for line in raw.cfa], np.uint32))
     row_starts, row_cells = upload(rows * np.uint32(width)), upload(rows % down * across)
@@ -147,6 +147,7 @@ def sharpen_frame(
     small = _own_light(sample[4], at_site([*shares], site[4]), plane[3], noises[4]) * shares
     few = dr.minimum(FEW * reduce(larger, [*dr.gather(jit.Array4f, noise_gains, pixel)]), 1.0)
     sharp += few * (1.0 - 1.0 / (1.0 + dr.square(dr.square(contrast / SMALL)))) * (small - sharp)
+    sharp += dr.gather(jit.Float, certain, of_tile) * (small - sharp)
     result = dr.empty(jit.Float, planes.size)
     dr.scatter(result, sharp, pixel, mode=dr.ReduceMode.NoConflicts)
     dr.eval(result)

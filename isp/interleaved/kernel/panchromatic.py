@@ -26,6 +26,12 @@ DETAIL_PX = 5  # side of the window over which detail is distinguished from nois
 FAINT = 12.0  # light, in units of W's dark noise, below which samples say nothing about colour
 LEAST_LIGHT = 0.3  # value of m_W, which is about 1 in good light, below which colours approach a neutral
 LEAST_SHARE = 0.02  # least share of a channel in W, as a fraction of a neutral's share
+# Contrasts b / A of lines two pixels apart from which on they begin to count, and count fully. A wall beside a window
+# that is 50 times as bright shows 0.28. From 0.05 on, leaves lose their green: infrared makes W and G alike there.
+LINE_CONTRAST = 0.3, 0.45
+# Squares of the other two patterns, over that of lines, at which lines no longer count. A surface in sodium light among
+# grey ones shows 0.33. At most 1, so that only upright or only lying lines count.
+OTHER_PATTERNS = 0.3
 BAND_PIXELS = 2_000_000  # pixels that are processed together, with 60 bytes each
 
 Numbers = list[Float]  # Dr.Jit arrays, such as one per channel
@@ -47,6 +53,17 @@ def surroundings_steps(tile: int) -> range:
 def tent_radii(tile: Tile) -> tuple[int, int]:
     """Return the radii [pixels], down and across, of the smallest tent that weights all cells of a tile equally."""
     return max(len(tile) - 1, 1), max(len(tile[0]) - 1, 1)
+
+
+def line_signs(raw: RawImage) -> Floats | None:
+    """Return signs of the channels in upright lines, lying lines and a checkerboard, two pixels apart, (3, channel).
+
+    Lines look like a colour only if the tile is 2 x 2 pixels of four channels. For any other tile, return None.
+    """
+    if len(raw.channels) != 4 or (len(raw.cfa), len(raw.cfa[0])) != (2, 2):
+        return None
+    cells = [divmod([*raw.cfa[0], *raw.cfa[1]].index(name), 2) for name in raw.channels]
+    return np.array([[(-1.0) ** j, (-1.0) ** i, (-1.0) ** (i + j)] for i, j in cells]).T
 
 
 @dataclass(frozen=True)
@@ -123,31 +140,34 @@ class Frame:
     ratios: Floats
 
 
-def guide_frame(raw: RawImage, ratios: Floats, white: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Compute the surroundings' shares, (tile row, tile column, channel), and the guide, (h, w) [units of W's noise].
+def guide_frame(raw: RawImage, ratios: Floats, white: int) -> tuple[NDArray[np.float32], ...]:
+    """Compute the surroundings' shares, the guide [units of W's noise], and the weight of lines.
 
-    The formulas are those of `isp.interleaved.panchromatic.read_as_white`.
+    The shapes are (tile row, tile column, channel), (h, w) and (tile row, tile column). The formulas are those of
+    `isp.interleaved.panchromatic.read_as_white`.
     """
     height, width = raw.shape
     down, across = len(raw.cfa), len(raw.cfa[0])
     frame = Frame(raw, [raw.channels.index(name) for line in raw.cfa for name in line], white, ratios)
     shares = np.empty((-(-height // down), -(-width // across), len(ratios)), np.float32)
     guide = np.empty((height, width), np.float32)
+    weights = np.empty(shares.shape[:2], np.float32)
     # Rows on which a pixel depends: windows of the surroundings, in tiles, tents, and the window of detail.
     reach = (window_steps(down)[-1] + surroundings_steps(down)[-1] + 6) * down
     step = max(BAND_PIXELS // width // down, 1) * down
     for first in range(0, height, step):
         last = min(first + step, height)
         start, end = max(first - reach, 0), min(last + reach, height)
-        of_band, guide_e = _guide_band(frame, (start, end), slice(first - start, last - start))
+        of_band, lines, guide_e = _guide_band(frame, (start, end), slice(first - start, last - start))
         guide[first:last] = stabilise_channel(guide_e, raw, raw.channels[white])
         inside = slice((first - start) // down, -(-(last - start) // down))
         shares[first // down : -(-last // down)] = of_band[inside, :, : len(ratios)]
-    return shares, guide
+        weights[first // down : -(-last // down)] = lines[inside]
+    return shares, guide, weights
 
 
-def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Compute a band of rows: surroundings' shares (tile row, column, channel), and the guide g of the rows `inside`.
+def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDArray[np.float32], ...]:
+    """Compute a band of rows: surroundings' shares, weight of lines, and the guide g of the rows `inside`.
 
     The guide is in electrons of W. x, v, N, t, T, D and g are those of `isp.interleaved.panchromatic.read_as_white`.
     """
@@ -182,7 +202,7 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     dr.eval(light)
     samples = pixels.store(plain, electrons / larger(light, faint))
     tiles = _grid(-(-height // down), -(-width // across), max(*surroundings_steps(down), *surroundings_steps(across)))
-    shares, around = _shares(frame, tiles, (height, width), samples, float(dark[frame.white]))
+    shares, around, lines_weight = _shares(frame, tiles, (height, width), samples, float(dark[frame.white]))
 
     # v: what W would read by this sample alone; its weight is 1 / N.
     of_tile = tile_row[0] * dr.opaque(jit.UInt, -(-width // across)) + tile_column[0]
@@ -215,12 +235,13 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     trusted = larger(squares - float(DETAIL_PX**2), 0.0) / inverse + mean_variance
     guide = mean + trusted / (trusted + own_variance) * difference
     dr.eval(guide)
-    by_tile = around.numpy().reshape(-(-height // down), -(-width // across), -1)
-    return by_tile, guide.numpy().reshape(height, width)[inside]
+    by_tile = -(-height // down), -(-width // across)
+    surroundings, weights = around.numpy().reshape(*by_tile, -1), lines_weight.numpy().reshape(by_tile)
+    return surroundings, weights, guide.numpy().reshape(height, width)[inside]
 
 
-def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Float, dark: float) -> tuple[Float, Float]:
-    """Compute shares per tile, those of the window and those of the surroundings.
+def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Float, dark: float) -> tuple[Float, ...]:
+    """Compute shares per tile, those of the window and those of the surroundings, and the weight of lines.
 
     `samples` holds each pixel's sample as if light were neutral, and relative to the light around. `shape` is the size
     of the band [pixels], and `dark` the variance of W's dark noise [e-^2].
@@ -268,14 +289,39 @@ def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Float, d
     means, error = tiles.load(mean_planes, here, count)[0], tiles.load(error_planes, here, count)[0]
     far = _lifted(far, neutral, white)
     ratio = [f / far[white] for f in far]
+    around = [larger(r, LEAST_SHARE * n) for r, n in zip(ratio, neutral, strict=True)]
+    means, weight = _without_lines(means, error, around, line_signs(frame.raw))
     away = [m - r * means[white] for m, r in zip(means, ratio, strict=True)]
     errors = [larger(e + dr.square(r) * error[white], TINY) for e, r in zip(error, ratio, strict=True)]
     chi_squared = sum((dr.square(a) / e for a, e in zip(away, errors, strict=True)), 0.0)
     hidden = dr.minimum(1.0 / larger(chi_squared, TINY), 1.0)
     means = _lifted([larger(m - hidden * a, 0.0) for m, a in zip(means, away, strict=True)], neutral, white)
     of_window = [larger(m / means[white], LEAST_SHARE * n) for m, n in zip(means, neutral, strict=True)]
-    around = [larger(r, LEAST_SHARE * n) for r, n in zip(ratio, neutral, strict=True)]
-    return tiles.store(*of_window), tiles.store(*around)
+    return tiles.store(*of_window), tiles.store(*around), tiles.store(weight)
+
+
+def _without_lines(means: Numbers, error: Numbers, around: Numbers, signs: Floats | None) -> tuple[Numbers, Float]:
+    """Subtract from the channels' means what grey lines two pixels apart would show, and return their weight too."""
+    if signs is None:
+        return means, dr.zeros(type(means[0]), dr.width(means[0]))
+    as_white = [m / share for m, share in zip(means, around, strict=True)]
+    level = larger(sum(as_white[1:], as_white[0]) / 4.0, TINY)
+    variance = sum((s / dr.square(share) for s, share in zip(error, around, strict=True)), 0.0) / 16.0
+    patterns = [_weighted(as_white, (of_pattern / 4.0).tolist()) for of_pattern in signs]
+    all_squares = sum((dr.square(b) for b in patterns), 0.0)
+    least, full = LINE_CONTRAST
+    weights = list[Float]()
+    for b in patterns[:2]:
+        square = larger(dr.square(b), TINY)
+        alone = 1.0 - (all_squares - square) / (OTHER_PATTERNS * square)
+        clear = dr.minimum((dr.abs(b) / level - least) / (full - least), 1.0)
+        weights.append(larger(alone, 0.0) * larger(clear, 0.0) * larger(1.0 - variance / square, 0.0))
+    upright, lying = (weight * b for weight, b in zip(weights, patterns[:2], strict=True))
+    means = [
+        m - share * (float(s) * upright + float(t) * lying)
+        for m, share, s, t in zip(means, around, signs[0], signs[1], strict=True)
+    ]
+    return means, larger(*weights)
 
 
 def _lifted(means: Numbers, neutral: Numbers, white: int) -> Numbers:

@@ -99,6 +99,54 @@ def test_detail_that_the_eight_around_miss_stays():
     assert guide == pytest.approx(expected, rel=0.3)
 
 
+def lines_on_grey(axis, tile, seed=None) -> tuple[RawImage, np.ndarray]:
+    """Grey lines two pixels apart, 75 to 525 e- in G, on 10 x 10 pixels of an even grey of 300, and their light."""
+    light = np.full((64, 64), 300.0)
+    bright = np.indices((10, 10))[axis] % 2 == 0
+    light[27:37, 27:37] = np.where(bright, 525.0, 75.0)
+    return exposed(light, tile=tile, seed=seed), light
+
+
+@pytest.mark.parametrize("axis", [0, 1], ids=["lying", "upright"])
+def test_grey_lines_two_pixels_apart_stand_in_the_guide(axis):
+    """Each channel samples bright lines or dark ones alone; until decision 0065 the guide was even there."""
+    for tile in RGBW_PHASES:
+        raw, light = lines_on_grey(axis, tile)
+        guide, bright = guide_e(raw)[30:34, 30:34], light[30:34, 30:34] > 300.0
+        assert guide[bright].min() > 4.0 * guide[~bright].max(), tile  # light has 7, and the guide had 1
+        weights = read_as_white(raw, neutral_of(raw)).lines
+        assert (weights[15:17, 15:17] > 0.95).all(), tile
+        assert (weights[:8] == 0.0).all(), tile
+
+
+@pytest.mark.parametrize("axis", [0, 1], ids=["lying", "upright"])
+@pytest.mark.parametrize("engine", ["kernel"], indirect=True)
+def test_grey_lines_two_pixels_apart_are_developed_grey(axis):
+    for number, tile in enumerate(RGBW_PHASES):
+        raw, _ = lines_on_grey(axis, tile, seed=[axis, number])
+        rgb = PROCESSORS["interleaved"].develop(raw, np.eye(3), balance=RATIOS).rgb[31:34, 31:34]
+        assert np.median(np.ptp(rgb, axis=2) / rgb.mean(axis=2)) < 0.3, tile  # 1.2 before
+
+
+def test_colours_of_things_are_no_lines():
+    """Red, yellow, blue, leaves (bright in near infrared), sodium and a blue LED on grey; W sees light of all."""
+    relative = {  # to a neutral, R, G, B and W
+        "red": (1.5, 0.4, 0.4, 1.0),
+        "yellow": (1.3, 1.2, 0.3, 1.05),
+        "blue": (0.4, 0.6, 1.4, 0.7),
+        "leaf": (0.6, 1.1, 0.5, 1.1),
+        "sodium": (1.1, 1.0, 0.07, 0.63),
+        "LED": (0.1, 0.3, 3.3, 0.42),
+    }
+    for (name, colour), tile in product(relative.items(), RGBW_PHASES):
+        factors = dict(zip(NEUTRAL, colour, strict=True))
+        planes = {channel: np.full((64, 64), 300.0 * NEUTRAL[channel]) for channel in NEUTRAL}
+        for channel, plane in planes.items():
+            plane[26:37, 26:37] *= factors[channel]
+        raw = exposed(np.ones((64, 64)), planes, tile)
+        assert read_as_white(raw, neutral_of(raw)).lines.max() < 0.1, (name, tile)
+
+
 def test_a_full_w_reads_what_the_colours_around_say_of_a_neutral():
     raw = exposed(np.full((16, 18), 5000.0))
     assert raw.saturated.any()
@@ -134,11 +182,13 @@ def test_both_engines_agree(tile, monkeypatch):
             twin = read_as_white(raw, neutral_of(raw))
         assert kernel.shares == pytest.approx(twin.shares, rel=1e-4), shape
         assert kernel.guide == pytest.approx(twin.guide, rel=1e-4, abs=1e-3), shape
+        assert kernel.lines == pytest.approx(twin.lines, abs=1e-3), shape
         monkeypatch.setattr("isp.interleaved.kernel.panchromatic.BAND_PIXELS", 7 * shape[1])
         bands = read_as_white(raw, neutral_of(raw))
         monkeypatch.undo()
         assert np.array_equal(bands.guide, kernel.guide), shape
         assert np.array_equal(bands.shares, kernel.shares), shape
+        assert np.array_equal(bands.lines, kernel.lines), shape
 
 
 LAMPS = [(1, 1), (1, 2), (1, 3), (1, 4), (1, 5), (3, 1), (5, 1), (2, 2), (2, 5), (4, 4), (3, 3), (2, 3)]
