@@ -77,6 +77,7 @@ def binned(sensor: SensorConfig, way: str) -> SensorConfig:
         # Two rows, whose noise two photodiodes have together; 3 of 4 roundings: 3/12 of a DN^2.
         read_noise_e=hypot(2 * pixel.read_noise_e, 2 * pixel.row_noise_e, sensor.gain_e_per_dn / 2),
         row_noise_e=sqrt(8) * pixel.row_noise_e,
+        ramp_step_e=4 * pixel.ramp_step_e,  # black of the sum: each of four readings is raised by half a step
         telegraph_e=2 * pixel.telegraph_e,  # four readings' variances add; the tails of their sum are shorter
         column_gain_spread=pixel.column_gain_spread / sqrt(2),  # two readings in each of two columns
         column_offset_e=sqrt(8) * pixel.column_offset_e,

@@ -49,6 +49,10 @@ class PixelConfig:
     response_bend : float
         c of the response n (1 + c (1 - n / full_well_e)) of n collected electrons: its slope is 1 + c in the dark and
         1 - c at the well, and both ends stay where they are. 0 for a straight one. Development takes any for straight.
+    ramp_step_e, ramp_rise : float
+        What columns that have converted do to the ramp that all columns of a row are compared with, once the whole row
+        has converted: the readings above are raised by `ramp_step_e` [e-], and the ramp is steeper by `ramp_rise`. 0
+        for converters that don't disturb each other. Development and `noise_variance` leave both out.
     binned_well_e : float
         Electrons at which the sum of four pixels clips where they bin in charge: what the floating diffusion that they
         share holds. 0 for four times the well.
@@ -80,6 +84,8 @@ class PixelConfig:
     telegraph_share: Annotated[float, (0.0, 1.0, "give a fraction, 0 for none")] = 0.0
     telegraph_e: Annotated[float, (0.0, 1e9, "give electrons, 0 for none")] = 0.0
     response_bend: Annotated[float, (-0.5, 0.5, "give a fraction, 0 for a straight response")] = 0.0
+    ramp_step_e: Annotated[float, (0.0, 1e9, "give electrons, 0 for none")] = 0.0
+    ramp_rise: Annotated[float, (0.0, 10.0, "give a fraction, 0 for none")] = 0.0
     binned_well_e: float = 0.0
 
     __repr__ = brief
@@ -117,6 +123,11 @@ class PixelConfig:
         1/4. So the variance is a^2 / 2 for a pixel with a trap, and s A^2 over all pixels.
         """
         return sqrt(self.telegraph_share) * self.telegraph_e
+
+    @property
+    def has_shared_ramp(self) -> bool:
+        """Return whether the columns of a row disturb each other when they convert."""
+        return self.ramp_step_e > 0 or self.ramp_rise > 0
 
     @property
     def swing_e(self) -> float:

@@ -11,7 +11,7 @@ from rodcone.errors import InputError
 from sensor.cfa import block_sums
 from sensor.config import SensorConfig
 from sensor.device import Device
-from sensor.pixel import bent_e
+from sensor.pixel import PixelConfig, bent_e
 from sensor.random import NoiseTerm, draw_key, normals, philox, poisson
 from sensor.raw import RawImage
 from sensor.readings.best_estimate import merged_variance, merged_variances
@@ -66,7 +66,8 @@ def convert(
 
     Pixels that bin in charge are summed, and their floating diffusion clips; the response bends; the column's amplifier
     multiplies; fixed offsets and read noise, before the gain and after it, are added; the converter, whose top is the
-    well over the gain, rounds and clips; readings that bin in digital numbers are summed.
+    well over the gain, rounds and clips; readings that bin in digital numbers are summed. Columns of a row that share
+    a ramp disturb each other just before rounding.
     """
     converter = sensor
     if sensor.in_charge:
@@ -82,6 +83,8 @@ def convert(
         read_e += row_noise_e(converter, key, read_e.shape[0], reading)[:, None]
     if device.telegraph_e is not None:
         read_e += telegraph_noise_e(device.telegraph_e, key, reading)
+    if converter.pixel.has_shared_ramp:
+        read_e = shared_ramp_e(read_e, converter.pixel)
     dn = np.rint(read_e / converter.gain_e_per_dn + converter.black_dn)
     dn = np.clip(dn, 0, converter.white_dn).astype(np.uint16)
     return dn if sensor.in_charge else sensor.pixel_sums(dn)
@@ -112,6 +115,26 @@ def telegraph_noise_e(height_e: NDArray[np.float64], key: int, reading: int) -> 
     noise_e = np.zeros(height_e.shape)
     noise_e[rows, columns] = height_e[rows, columns] * (full[1] - full[0])
     return noise_e
+
+
+def shared_ramp_e(read_e: NDArray[np.float64], pixel: PixelConfig) -> NDArray[np.float64]:
+    """Return what columns read that compare their signals with one ramp and disturb it when they convert [e-], (h, w).
+
+    Each row converts by itself, and a column converts when the ramp has risen to its signal x. If F(x) is the share of
+    the row's columns that have converted before, then the reading is y with dy = (dx + step dF) / (1 + rise F): each
+    conversion raises later readings, and the ramp is steeper afterwards. So readings are right up to a row's dimmest
+    signal. In an even field, noise and fixed pattern are changed, but the mean over light hardly is, because most
+    columns convert after half of the others at every light. O(h w log w).
+    """
+    columns = read_e.shape[1]
+    order = np.argsort(read_e, axis=1, kind="stable")
+    sorted_e = np.take_along_axis(read_e, order, axis=1)
+    share = np.arange(1, columns) / columns
+    steps_e = (np.diff(sorted_e, axis=1) + pixel.ramp_step_e / columns) / (1 + pixel.ramp_rise * share)
+    sorted_e[:, 1:] = sorted_e[:, :1] + np.cumsum(steps_e, axis=1)
+    changed_e = np.empty_like(read_e)
+    np.put_along_axis(changed_e, order, sorted_e, axis=1)
+    return changed_e
 
 
 def draw_mean_frame(
@@ -317,17 +340,19 @@ def as_raw(
 ) -> RawImage:
     """Make a raw image of a frame that `engine` drew, with the camera's calibration and the chip's list of hot pixels.
 
-    Black is the mean reading of covered pixels. Dark current raises it, and adds to both kinds of dark noise: its shot
-    noise to the temporal one, and its differences by the columns' gains to the fixed one.
+    Black is the mean reading of covered pixels. A shared ramp raises it by half of its step, because half of a row's
+    columns convert before the average one. Dark current raises it, and adds to both kinds of dark noise: its shot noise
+    to the temporal one, and its differences by the columns' gains to the fixed one.
     """
     hot = None if hot is None else sensor.pixel_sums(hot)
     pixel = sensor.pixel
     dark_e = min(pixel.dark_current_e_per_s * exposure_s, pixel.full_well_e)
     read_dark_e = bent_e(dark_e, pixel) if pixel.response_bend else dark_e
+    raised_e = read_dark_e + pixel.ramp_step_e / 2
     return RawImage(
         dn=dn,
         cfa=sensor.cfa,
-        black_dn=min(sensor.black_dn + read_dark_e / sensor.gain_e_per_dn, sensor.white_dn - 1),
+        black_dn=min(sensor.black_dn + raised_e / sensor.gain_e_per_dn, sensor.white_dn - 1),
         white_dn=sensor.white_dn,
         gain_e_per_dn=sensor.gain_e_per_dn,
         read_noise_e=hypot(sensor.read_noise_e, sqrt(dark_e)),

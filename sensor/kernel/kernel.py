@@ -18,7 +18,7 @@ from sensor.device import Device
 from sensor.kernel.poisson import alias_table, poisson_single
 from sensor.pixel import bent_e
 from sensor.random import MULTIPLIERS, ROUNDS, WEYL, NoiseTerm
-from sensor.readout import convert, pixel_read_noise_e, row_noise_e, spread_charge, telegraph_noise_e
+from sensor.readout import convert, pixel_read_noise_e, row_noise_e, shared_ramp_e, spread_charge, telegraph_noise_e
 
 BANDS_AT_ONCE = 8  # a CPU prefetches about a dozen streams; 40 at once take a third longer, and compete for its cache
 LARGEST = np.finfo(np.float32).max
@@ -176,6 +176,8 @@ def read_frame(
     if device.telegraph_e is not None:
         offset_e = offset_e + telegraph_noise_e(device.telegraph_e, key, reading)
     read_e += upload(offset_e, copy_under=COPY_UNDER) + read_noise_e
+    if pixel.has_shared_ramp:
+        read_e = upload(shared_ramp_e(read_e.numpy().reshape(expected_e.shape), pixel))
     dn = read_e / dr.opaque(jit.Float64, one.gain_e_per_dn) + dr.opaque(jit.Float64, one.black_dn)
     dn = jit.Int(dr.clip(dr.round(dn), 0.0, dr.opaque(jit.Float64, float(one.white_dn))))
     return sensor.pixel_sums(dn.numpy().astype(np.uint16).reshape(expected_e.shape))

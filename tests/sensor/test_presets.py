@@ -40,7 +40,7 @@ def test_every_preset_is_a_file_that_says_what_it_is_and_names_every_pixel_term(
     text = preset_file(name).read_text("utf-8")
     assert text.startswith("# ")
     table = text.partition("[pixel]")[2].partition("[[readings]]" if preset(name).chip.readings else "[lens]")[0]
-    of_real_cameras = {"row_noise_e", "telegraph_share", "telegraph_e", "response_bend"}  # which `rodcone twin` writes
+    of_real_cameras = {"row_noise_e", "telegraph_share", "telegraph_e", "response_bend", "ramp_step_e", "ramp_rise"}
     terms = {field.name for field in fields(PixelConfig)} - {"binned_well_e"} - of_real_cameras
     if preset(name).chip.readings:
         terms -= {"read_noise_e", "dsnu_e", "full_well_e"}  # each reading's own
