@@ -28,11 +28,14 @@ from sensor.emva1288.from_frames import (
     without_surface,
 )
 from sensor.pixel import PixelConfig
+from studies.twin.ramp import Ramp, ramp_of
 from studies.twin.tails import is_rounding, noise_histograms, tail_ratio, telegraph_numbers
 
 APART = 0.01  # significance level at which camera and twin count as different, for all tests of one figure together
 LEAST_BENT = 4  # least number of lights to which the response's bend is fitted
 MOST_BENT = 0.3  # largest bend of the response that is tried
+RAMP_RANGE = (0.1, 0.75)  # signals over white between which a ramp that columns share is fitted
+MOST_RAMP_LIGHTS = 32
 SIMULATED_UM = 5.0  # pitch of the simulated pixel, which doesn't matter for light given in electrons
 
 
@@ -87,11 +90,17 @@ class Response:
         DN per electron of a full well.
     source : str
         Source of the bend, or why it is 0.
+    denied : bool
+        Whether K changes with light, but not because the response bends.
+    ramp : Ramp or None
+        The ramp that columns share, which then changes K.
     """
 
     bend: float
     gain_dn_per_e: float
     source: str
+    denied: bool = False
+    ramp: Ramp | None = None
 
     def light_e(self, signal_dn: Floats, white_dn: float) -> Floats:
         """Return the electrons whose response is a given signal [DN]."""
@@ -159,7 +168,7 @@ def twin_of(frames: FrameSet, name: str, seed: int = 0) -> Twin:
     bright = _largest(frames, lit=True, most_dn=figures.black_dn + room_dn)
     dark_dn, bright_dn = (_pixels(light, frames) for light in (dark, bright))
     mean = {False: _mean_image(dark_dn), True: _mean_image(bright_dn)}
-    response = response_of(figures)
+    response = _with_ramp(response_of(figures), frames, figures, mean[True])
     numbers = _with_patterns(frame_numbers(figures, [Path(name)]), figures, response, dark_dn, bright_dn)
     sensor = _sensor(numbers, figures)
 
@@ -255,9 +264,25 @@ def response_of(figures: FrameFigures) -> Response:
         by_means = -slope * white_dn / (start + slope * white_dn)
         if by_means / bend < 0.5:
             denied = f"noise by light would give {bend:.3f}, but means by photons give {by_means:.3f}"
-            return Response(0.0, straight, f"{denied}: K changes by another cause")
+            return Response(0.0, straight, f"{denied}: K changes by another cause", denied=True)
     told = "" if isnan(by_means) else f"; means by photons give {by_means:.3f}"
     return Response(bend, fitted(bend)[1], f"noise of {signal.size} lights, variance over mean{told}")
+
+
+def _with_ramp(response: Response, frames: FrameSet, figures: FrameFigures, flat: Floats) -> Response:
+    """Return the response with a ramp that columns share, if it explains a change of K that no bend explains."""
+    if not response.denied or len(figures.cfa) * len(figures.cfa[0]) > 1:
+        return response
+    pairs = []
+    for light in frames.lights:
+        share = (read_frame_pixels(light.frames[0], frames).dn.mean() - figures.black_dn) / figures.white_dn
+        if light.lit and len(light.frames) > 1 and RAMP_RANGE[0] <= share <= RAMP_RANGE[1]:
+            pairs.append((float(share), light))
+    pairs.sort(key=lambda pair: pair[0])
+    chosen = pairs[:: -(-len(pairs) // MOST_RAMP_LIGHTS) or 1]
+    taken = [_pixels(light, frames)[:2] for _, light in chosen]
+    ramp = ramp_of(taken, _pixels(_largest(frames, lit=False), frames)[:2], flat, figures.white_dn)
+    return response if ramp is None else replace(response, ramp=ramp, gain_dn_per_e=ramp.gain_dn_per_e)
 
 
 def _with_patterns(
@@ -273,7 +298,8 @@ def _with_patterns(
     black level that is a whole number of DN.
     """
     gain = response.gain_dn_per_e
-    black = round(figures.black_dn)
+    ramp = response.ramp
+    black = round(figures.black_dn - (ramp.step_dn / 2 if ramp else 0.0))  # covered columns are raised by half a step
     dark_dn2 = _column_variance(dark)
     signal = float(np.mean(bright) - np.mean(dark))
     bright_dn2 = max(_column_variance(bright) - dark_dn2, 0.0)
@@ -292,7 +318,14 @@ def _with_patterns(
     pixel["row_noise_e"] = SourcedValue(row_e, f"row means of {len(dark)} dark frames less their mean frame")
     pixel |= telegraph_numbers(dark, gain, sqrt(pixel["read_noise_e"].value ** 2 - row_e**2))
     pixel["response_bend"] = SourcedValue(response.bend, response.source)
-    return replace(numbers, pixel=pixel)
+    if ramp:
+        source = (
+            f"K over lights and pixels of rows that weren't fitted: within {ramp.left:.1%}, {ramp.before:.1%} without"
+        )
+        pixel["ramp_step_e"] = SourcedValue(ramp.step_dn / gain, source)
+        pixel["ramp_rise"] = SourcedValue(ramp.rise, source)
+    settings = numbers.settings | {"black_level_dn": replace(numbers.settings["black_level_dn"], value=black)}
+    return replace(numbers, pixel=pixel, settings=settings)
 
 
 def _column_variance(frames: Sequence[NDArray[Any]]) -> float:
@@ -327,7 +360,7 @@ def _sensor(numbers: PixelNumbers, figures: FrameFigures) -> SensorConfig:
         lens=LensConfig(f_number=2.8),
         cfa=figures.cfa,
         bits=int(numbers.settings["bits"].value),
-        black_level_dn=round(figures.black_dn),
+        black_level_dn=int(numbers.settings["black_level_dn"].value),
         white_level_dn=int(figures.white_dn),
     )
 
