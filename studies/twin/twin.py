@@ -35,7 +35,7 @@ APART = 0.01  # significance level at which camera and twin count as different, 
 LEAST_BENT = 4  # least number of lights to which the response's bend is fitted
 MOST_BENT = 0.3  # largest bend of the response that is tried
 RAMP_RANGE = (0.1, 0.75)  # signals over white between which a ramp that columns share is fitted
-MOST_RAMP_LIGHTS = 32
+MOST_RAMP_LIGHTS, MOST_RAMP_ROWS = 32, 512  # that many are enough, and more take memory
 SIMULATED_UM = 5.0  # pitch of the simulated pixel, which doesn't matter for light given in electrons
 
 
@@ -273,15 +273,20 @@ def _with_ramp(response: Response, frames: FrameSet, figures: FrameFigures, flat
     """Return the response with a ramp that columns share, if it explains a change of K that no bend explains."""
     if not response.denied or len(figures.cfa) * len(figures.cfa[0]) > 1:
         return response
-    pairs = []
+    lit = []
     for light in frames.lights:
         share = (read_frame_pixels(light.frames[0], frames).dn.mean() - figures.black_dn) / figures.white_dn
         if light.lit and len(light.frames) > 1 and RAMP_RANGE[0] <= share <= RAMP_RANGE[1]:
-            pairs.append((float(share), light))
-    pairs.sort(key=lambda pair: pair[0])
-    chosen = pairs[:: -(-len(pairs) // MOST_RAMP_LIGHTS) or 1]
-    taken = [_pixels(light, frames)[:2] for _, light in chosen]
-    ramp = ramp_of(taken, _pixels(_largest(frames, lit=False), frames)[:2], flat, figures.white_dn)
+            lit.append((float(share), light))
+    lit.sort(key=lambda one: one[0])
+    chosen = lit[:: -(-len(lit) // MOST_RAMP_LIGHTS) or 1]
+    top = max(flat.shape[0] - MOST_RAMP_ROWS, 0) // 2
+
+    def pair(light: LightFrames) -> list[NDArray[Any]]:
+        return [read_frame_pixels(frame, frames).dn[top : top + MOST_RAMP_ROWS] for frame in light.frames[:2]]
+
+    dark = pair(_largest(frames, lit=False))
+    ramp = ramp_of([pair(light) for _, light in chosen], dark, flat[top : top + MOST_RAMP_ROWS], figures.white_dn)
     return response if ramp is None else replace(response, ramp=ramp, gain_dn_per_e=ramp.gain_dn_per_e)
 
 
