@@ -33,6 +33,7 @@ from studies.twin.tails import is_rounding, noise_histograms, tail_ratio, telegr
 
 APART = 0.01  # significance level at which camera and twin count as different, for all tests of one figure together
 LEAST_BENT = 4  # least number of lights to which the response's bend is fitted
+MOST_MISCOUNTED = 0.5  # mean per photon that differs by more from the median's share is a wrong count of photons
 MOST_BENT = 0.3  # largest bend of the response that is tried
 RAMP_RANGE = (0.1, 0.75)  # signals over white between which a ramp that columns share is fitted
 MOST_RAMP_LIGHTS, MOST_RAMP_ROWS = 32, 512  # that many are enough, and more take memory
@@ -260,7 +261,9 @@ def response_of(figures: FrameFigures) -> Response:
     bend = float(minimize_scalar(lambda x: fitted(x)[0], bounds=(-MOST_BENT, MOST_BENT), method="bounded").x)
     by_means = nan
     if not np.any(np.isnan(photons)):
-        slope, start = np.polyfit(signal, signal / photons, 1)
+        ratio = signal / photons
+        counted = np.abs(ratio / np.median(ratio) - 1) < MOST_MISCOUNTED
+        slope, start = np.polyfit(signal[counted], ratio[counted], 1)
         by_means = -slope * white_dn / (start + slope * white_dn)
         if by_means / bend < 0.5:
             denied = f"noise by light would give {bend:.3f}, but means by photons give {by_means:.3f}"
@@ -329,7 +332,7 @@ def _with_patterns(
         )
         pixel["ramp_step_e"] = SourcedValue(ramp.step_dn / gain, source)
         pixel["ramp_rise"] = SourcedValue(ramp.rise, source)
-    settings = numbers.settings | {"black_level_dn": replace(numbers.settings["black_level_dn"], value=black)}
+    settings = {**numbers.settings, "black_level_dn": replace(numbers.settings["black_level_dn"], value=black)}
     return replace(numbers, pixel=pixel, settings=settings)
 
 
