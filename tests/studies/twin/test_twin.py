@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from math import nan
 from pathlib import Path
 
@@ -132,6 +133,16 @@ def test_a_bent_response_is_measured_back_unless_the_means_by_photons_deny_it():
     assert denied.bend == 0.0
     assert "another cause" in denied.source
     assert response_of(measure_set(frames_of())).bend == 0.0
+
+
+def test_a_light_whose_photons_are_counted_wrongly_does_not_tell_a_bend():
+    """Means per photon are the same under all lights but one in the middle, which counts a twelfth of its photons."""
+    frames = frames_of(bend=0.15, lights_e=np.linspace(1000, 14_500, 9), photons_per_dn=5.0)
+    lights = list(frames.lights)
+    lights[3] = replace(lights[3], photons=lights[3].photons / 12)
+    denied = response_of(measure_set(replace(frames, lights=tuple(lights))))
+    assert denied.denied
+    assert denied.bend == 0.0
 
 
 def test_the_command_writes_a_preset_that_opens_and_a_page(tmp_path: Path) -> None:
