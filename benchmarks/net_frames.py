@@ -50,9 +50,9 @@ LONGEST_S = 0.066
 LAMPS = ("D65", "D65", "A", "LED-B3")  # half of the groups, the others' are drawn
 # Of a group's pictures in turn; those of a kind that is drawn are parts of one picture.
 KINDS = ("photograph",) * 6 + ("gratings", "leaves")
-HELD_KINDS = ("leaves", "photograph", "gratings", "photograph")
+DRAWN_SURFACES = 0.25  # share of photographs that lend their brightness alone: other spectra than photographs have
 COARSEST = 8  # side of a pixel of a frame in those of a folder's photograph, at most; its least is 2
-HELD_CD_M2 = (0.05, 0.5, 5.0, 100.0)
+HELD_CD_M2 = (0.05, 0.5, 5.0, 100.0)  # of the groups to validate on, in turn
 NEAR = 2.0  # by which a group's light differs at most, so that it shares `ple`'s tables
 MOSAICS = ("rgbw", "bayer")
 DRAWN = {"leaves": leaf_picture, "gratings": gratings}
@@ -128,16 +128,28 @@ def read_reduced(rng: np.random.Generator, source: str | Path) -> Floats:
     return mean_of_squares(decode_srgb(encoded / 255.0), step)
 
 
-def photograph_signals(rng: np.random.Generator, sensor: SensorConfig, lamp: str, linear: Floats) -> Floats:
-    """Return a photograph as signals of R, G, B and W, with a brightness and tint of its own."""
-    if linear.shape[-1] == 1:
-        share = linear / linear.max()
-        ends = [draw_surface(rng) for _ in range(2)]
-        return np.asarray((share * ends[0] + (1 - share) * ends[1]) @ collected(sensor, lamp, NM).T)
+def recoloured(rng: np.random.Generator, linear: Floats) -> Floats:
+    """Change a photograph's colours at random, so that a network can't learn which colours things have."""
     if rng.random() < 0.3:
         linear = linear[..., rng.permutation(3)]
-    linear = np.clip(linear * np.exp(rng.normal(0.0, 0.15, 3)), 0.0, 1.0)
-    return np.asarray(surface_reflectances(linear)[0] @ collected(sensor, lamp, DEFAULT_WAVELENGTH_NM).T)
+    if rng.random() < 0.4:  # paler or more vivid
+        grey = linear.mean(axis=-1, keepdims=True)
+        linear = np.maximum(grey + rng.uniform(0.4, 2.0) * (linear - grey), 0.0)
+    if rng.random() < 0.15:  # as if all were of one colour
+        linear = linear * (rng.uniform(0.05, 0.6, 3) ** (np.arange(3) != rng.integers(3)))
+    return np.clip(linear * np.exp(rng.normal(0.0, 0.2, 3)), 0.0, 1.0)
+
+
+def photograph_signals(rng: np.random.Generator, sensor: SensorConfig, lamp: str, linear: Floats) -> Floats:
+    """Return a photograph as signals of R, G, B and W, in other colours, and in part as two drawn surfaces."""
+    if linear.shape[-1] == 1 or rng.random() < DRAWN_SURFACES:
+        share = linear.mean(axis=-1, keepdims=True)
+        share = share / max(share.max(), 1e-3)
+        ends = [draw_surface(rng) for _ in range(2)]
+        return np.asarray((share * ends[0] + (1 - share) * ends[1]) @ collected(sensor, lamp, NM).T)
+    return np.asarray(
+        surface_reflectances(recoloured(rng, linear))[0] @ collected(sensor, lamp, DEFAULT_WAVELENGTH_NM).T
+    )
 
 
 def take(
@@ -179,11 +191,12 @@ def draw_group(folder: Path, index: int, held: bool, photographs: Sequence[str |
     camera = low_noise() if held else draw_camera(rng)
     lamp = str(rng.choice(LAMPS)) if rng.random() < 0.5 or held else draw_illuminant(rng)
     middle = rng.uniform(*np.log(LUMINANCE_CD_M2))
-    kinds = HELD_KINDS if held else KINDS
-    levels = HELD_CD_M2 if held else np.exp(middle + rng.uniform(-np.log(NEAR), np.log(NEAR), len(kinds)))
+    levels = np.exp(middle + rng.uniform(-np.log(NEAR), np.log(NEAR), len(KINDS)))
+    if held:
+        levels = np.full(len(KINDS), HELD_CD_M2[index % len(HELD_CD_M2)])
     drawn: dict[str, Floats] = {}
     found = []
-    for kind, level in zip(kinds, levels, strict=True):
+    for kind, level in zip(KINDS, levels, strict=True):
         source = photographs[int(rng.integers(len(photographs)))] if kind == "photograph" else kind
         signals = draw_signals(rng, camera, lamp, source, drawn)
         found.append(take(rng, camera, lamp, Path(source).stem, signals, float(level)))
