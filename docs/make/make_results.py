@@ -37,7 +37,7 @@ class Part:
     ----------
     name : str
     minutes : float
-        About how long it takes on two idle cores.
+        About how long it takes on two cores with AVX-512.
     commands : tuple of str
         Run in the repository's root, in this order; ``{work}`` is the part's own folder.
     tables : tuple of str
@@ -78,7 +78,7 @@ def announcement(parts: Sequence[Part], version: str) -> str:
     waiting = [part for part in parts if not part.is_made(version)]
     lines = [f"{part.name:18} {'made' if part.is_made(version) else f'{part.minutes:4g} min'}" for part in parts]
     total = sum(part.minutes for part in waiting)
-    return "\n".join([*lines, f"about {total:g} minutes on two idle cores, in {version}"])
+    return "\n".join([*lines, f"about {total:g} minutes on two cores with AVX-512, in {version}"])
 
 
 def make(part: Part, version: str) -> None:
