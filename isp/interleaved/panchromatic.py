@@ -22,6 +22,7 @@ from isp.interleaved.kernel.panchromatic import (
     LEAST_LIGHT,
     LEAST_SHARE,
     LINE_CONTRAST,
+    LINE_ERRORS,
     OTHER_PATTERNS,
     guide_frame,
     line_signs,
@@ -67,7 +68,8 @@ def read_as_white(raw: RawImage, neutral: Floats) -> WhiteReading:
 
         p_k = [1 - (b_1^2 + b_2^2 + b_3^2 - b_k^2) / (0.3 b_k^2)] min(1, (|b_k| / A - 0.3) / 0.15) [1 - V / b_k^2],
 
-    where each factor is at least 0, and p_k s_k(c) b_k q_c is subtracted from m_c.
+    where each factor is at least 0, and p_k s_k(c) b_k q_c is subtracted from m_c. V counts as at least 25 times what
+    noise alone would make it, so that noise isn't taken for lines.
 
     Where m_W is below 0.3, light is too faint to show a colour. Therefore a neutral's (0.3 - m_W) n_c is added to m_c,
     and likewise to f_c. The ratio is then r_c = m_c / m_W, but at least 0.02 n_c.
@@ -175,7 +177,7 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
     far += np.maximum(LEAST_LIGHT - far[..., white, None], 0.0) * ratios
     share = far / far[..., white, None]
     surroundings = np.maximum(share, LEAST_SHARE * ratios)
-    means, lines = _without_lines(means, error, surroundings, line_signs(raw))
+    means, lines = _without_lines(means, error, surroundings, np.maximum(mean, np.sqrt(dark[white]) + TINY), raw)
     away = means - share * means[..., white, None]
     chi_squared = (away**2 / np.maximum(error + share**2 * error[..., white, None], TINY)).sum(axis=2, keepdims=True)
     means = np.maximum(means - away * np.minimum(1.0 / np.maximum(chi_squared, TINY), 1.0), 0.0)
@@ -203,13 +205,18 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
     return surroundings, around + trusted / (trusted + own_variance) * difference, lines
 
 
-def _without_lines(means: Floats, error: Floats, around: Floats, signs: Floats | None) -> tuple[Floats, Floats]:
+def _without_lines(means: Floats, error: Floats, around: Floats, light: Floats, raw: RawImage) -> tuple[Floats, Floats]:
     """Subtract from the channels' means what grey lines two pixels apart would show, and return their weight too."""
+    signs = line_signs(raw)
     if signs is None:
         return means, np.zeros(means.shape[:2])
     as_white = means / around
     level = np.maximum(as_white.mean(axis=2), TINY)[..., None]
-    variance = (error / around**2).sum(axis=2, keepdims=True) / 16.0
+    shot, dark, _ = channel_noise(raw)
+    light = light[..., None]
+    noise = (shot * np.maximum(means, 0.0) + dark / light) / light / len(window_steps(2)) ** 2
+    scatter, noise_variance = ((x / around**2).sum(axis=2, keepdims=True) / 16.0 for x in (error, noise))
+    variance = np.maximum(scatter, LINE_ERRORS**2 * noise_variance)
     patterns = as_white @ signs.T / 4.0
     lines = patterns[..., :2]
     square = np.maximum(lines**2, TINY)

@@ -29,6 +29,7 @@ LEAST_SHARE = 0.02  # least share of a channel in W, as a fraction of a neutral'
 # Contrasts b / A of lines two pixels apart from which on they begin to count, and count fully. A wall beside a window
 # that is 50 times as bright shows 0.28. From 0.05 on, leaves lose their green: infrared makes W and G alike there.
 LINE_CONTRAST = 0.3, 0.45
+LINE_ERRORS = 5.0  # standard errors of the means, by noise alone, that lines have to exceed
 # Squares of the other two patterns, over that of lines, at which lines no longer count. A surface in sodium light among
 # grey ones shows 0.33. At most 1, so that only upright or only lying lines count.
 OTHER_PATTERNS = 0.3
@@ -278,7 +279,7 @@ def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Float, d
         for s, n, m in zip(squares, counts, means, strict=True)
     ]
     white = frame.white
-    mean_planes, error_planes = tiles.store(*means), tiles.store(*error)
+    mean_planes, error_planes = tiles.store(*means), tiles.store(*error, larger(light / samples_all, level))
 
     # Use the window's shares as far as its samples are certain, and for the rest those of the surroundings.
     rows, columns = surroundings_steps(down), surroundings_steps(across)
@@ -286,11 +287,11 @@ def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Float, d
     far = _sums(tiles.load(lines, tiles.around(rows, [0]), count))
     far = [larger(total / (len(rows) * len(columns)), 0.0) for total in far]
     here = tiles.around([0], [0])
-    means, error = tiles.load(mean_planes, here, count)[0], tiles.load(error_planes, here, count)[0]
+    means, (*error, light) = tiles.load(mean_planes, here, count)[0], tiles.load(error_planes, here, count + 1)[0]
     far = _lifted(far, neutral, white)
     ratio = [f / far[white] for f in far]
     around = [larger(r, LEAST_SHARE * n) for r, n in zip(ratio, neutral, strict=True)]
-    means, weight = _without_lines(means, error, around, line_signs(frame.raw))
+    means, weight = _without_lines(means, error, around, light, frame.raw)
     away = [m - r * means[white] for m, r in zip(means, ratio, strict=True)]
     errors = [larger(e + dr.square(r) * error[white], TINY) for e, r in zip(error, ratio, strict=True)]
     chi_squared = sum((dr.square(a) / e for a, e in zip(away, errors, strict=True)), 0.0)
@@ -300,13 +301,26 @@ def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Float, d
     return tiles.store(*of_window), tiles.store(*around), tiles.store(weight)
 
 
-def _without_lines(means: Numbers, error: Numbers, around: Numbers, signs: Floats | None) -> tuple[Numbers, Float]:
+def _without_lines(
+    means: Numbers, error: Numbers, around: Numbers, light: Float, raw: RawImage
+) -> tuple[Numbers, Float]:
     """Subtract from the channels' means what grey lines two pixels apart would show, and return their weight too."""
+    signs = line_signs(raw)
     if signs is None:
         return means, dr.zeros(type(means[0]), dr.width(means[0]))
     as_white = [m / share for m, share in zip(means, around, strict=True)]
     level = larger(sum(as_white[1:], as_white[0]) / 4.0, TINY)
-    variance = sum((s / dr.square(share) for s, share in zip(error, around, strict=True)), 0.0) / 16.0
+    shot, dark, _ = channel_noise(raw)
+    samples = len(window_steps(2)) ** 2
+    noise = [
+        (dr.opaque(type(light), float(k)) * larger(m, 0.0) + dr.opaque(type(light), float(d)) / light) / light / samples
+        for k, d, m in zip(shot, dark, means, strict=True)
+    ]
+    scatter, noise_variance = (
+        sum((s / dr.square(share) for s, share in zip(of_means, around, strict=True)), 0.0) / 16.0
+        for of_means in (error, noise)
+    )
+    variance = larger(scatter, LINE_ERRORS**2 * noise_variance)
     patterns = [_weighted(as_white, (of_pattern / 4.0).tolist()) for of_pattern in signs]
     all_squares = sum((dr.square(b) for b in patterns), 0.0)
     least, full = LINE_CONTRAST

@@ -128,6 +128,16 @@ def test_grey_lines_two_pixels_apart_are_developed_grey(axis):
         assert np.median(np.ptp(rgb, axis=2) / rgb.mean(axis=2)) < 0.3, tile  # 1.2 before
 
 
+def test_noise_in_even_light_is_no_lines():
+    """Light at 555 nm, where B reads 0.9 e-: its noise over its share is as large as lines would be."""
+    at_555_nm = {"R": 13.5 / 27.5, "G": 1.0, "B": 0.9 / 27.5, "W": 7.8 / 27.5}
+    ratios = np.array([0.102, 0.205, 0.092, 1.0])
+    for seed, tile in enumerate(RGBW_PHASES):
+        raw = exposed(np.full((64, 64), 27.5), at_555_nm, tile, seed)
+        order = ["RGBW".index(name) for name in raw.channels]
+        assert read_as_white(raw, ratios[order]).lines.mean() < 0.02, tile  # 0.34 by the scatter of samples alone
+
+
 def test_colours_of_things_are_no_lines():
     """Red, yellow, blue, leaves (bright in near infrared), sodium and a blue LED on grey; W sees light of all."""
     relative = {  # to a neutral, R, G, B and W
