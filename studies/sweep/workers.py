@@ -259,8 +259,9 @@ def _pool(workers: int, threads: int) -> Iterator[ProcessPoolExecutor]:
     others = active_children()
     with _inherited(threads):
         pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _begin)
-        for _ in range(workers):  # each submission starts one process, because none is idle yet
-            pool.submit(cores)
+        with suppress(BrokenExecutor):  # one was killed while it started; the first cell finds the pool broken
+            for _ in range(workers):  # each submission starts one process, because none is idle yet
+                pool.submit(cores)
     impatience = threading.Timer(LEAVE_S, _end, ([process for process in active_children() if process not in others],))
     try:
         yield pool

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -237,6 +237,33 @@ def test_a_cell_that_ends_its_worker_is_given_up_and_all_others_are_made(cells, 
     assert sorted(made) == sorted(cell.key for cell in (cells[0], *cells[2:]))
     assert "\n" not in str(told.value)
     assert active_children() == []
+
+
+class KilledAtOnce(ProcessPoolExecutor):
+    """Pool of which the first one's processes are killed as they start."""
+
+    pools = 0
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        type(self).pools += 1
+        self.is_first = self.pools == 1
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future = super().submit(fn, *args, **kwargs)
+        if self.is_first:
+            for process in list(self._processes.values()):
+                process.kill()
+            assert isinstance(future.exception(), BrokenExecutor)
+        return future
+
+
+@pytest.mark.thorough
+def test_a_pool_whose_worker_is_killed_while_it_starts_is_made_anew(cells, monkeypatch):
+    monkeypatch.setattr(workers, "ProcessPoolExecutor", KilledAtOnce)
+    made = [row.key for row in run_in_processes(cells, 2)]
+    assert sorted(made) == sorted(cell.key for cell in cells)
+    assert KilledAtOnce.pools == 2
 
 
 @pytest.mark.thorough
