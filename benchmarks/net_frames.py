@@ -6,8 +6,9 @@ r"""Frames to train the network of `corrected_ple` on: pictures that judge nothi
 A frame holds what the network sees, and its target: exact R, G and B of the picture by the camera's own matrix, as
 encoded sRGB over the picture's white. So the network isn't taught colours, which a matrix has to choose.
 
-Pictures are drawn, leaves and gratings of drawn reflectances, or photographs that `ple`'s prior was trained on, whose
-colours become surfaces' spectra; those without colour get two drawn surfaces at their ends. Read noise is 0.7 to 6 e-,
+Pictures are drawn, leaves and gratings of drawn reflectances, or photographs: those that `ple`'s prior was trained on,
+and those of a folder. Their colours are changed at random and become surfaces' spectra; those without colour, and one
+in four of the others, get two drawn surfaces at their ends. Read noise is 0.7 to 6 e-,
 pitch 0.8 to 3 um, light 0.02 to 1000 cd/m^2, the lens sharp to soft; lamps are those of `draw_illuminant`. `HELD` is a
 photograph left out to validate on, beside those of a folder that `is_held` names.
 """

@@ -55,7 +55,7 @@ def listed() -> list[NetPhotograph]:
 
 
 def is_held(name: str) -> bool:
-    """Whether a photograph is left out of training, to validate on: one in ten, by its name alone."""
+    """Return whether a photograph is left out of training, to validate on: one in ten, by its name alone."""
     return int(sha256(name.encode()).hexdigest(), 16) % ONE_HELD_IN == 0
 
 

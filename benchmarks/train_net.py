@@ -121,7 +121,9 @@ def read_frames(folder: Path, part: str, mosaic: str) -> Frames:
             seen.append(file["seen"])
             targets.append(file["target"])
             facts = zip(file["kind"], file["lamp"], file["level_cd_m2"], strict=True)
-            names += [f"{path.stem[-4:]}.{len(names)} {kind} {lamp} {level:g}" for kind, lamp, level in facts]
+            names += [
+                f"{path.stem[-4:]}.{index} {kind} {lamp} {level:g}" for index, (kind, lamp, level) in enumerate(facts)
+            ]
     return Frames(np.concatenate(seen), np.concatenate(targets), tuple(names))
 
 
