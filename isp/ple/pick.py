@@ -1,6 +1,7 @@
 """Choice of each patch's component in the prior: candidates by an approximate likelihood, then the likeliest one."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,24 @@ from isp.ple.tables import Table
 from rodcone.types import Singles
 
 BLOCK = 1000  # patches at once, which fit into a core's cache, where rows of a power of two would share the same places
+UNEXPLAINED = 1.2  # misfit from which on a patch is held against oblique lines too
 MOST = 12  # largest number of trained candidates per patch
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The likeliest component of each patch so far.
+
+    Attributes
+    ----------
+    component : (patch,) int16
+    misfit, likelihood : (patch,) float32
+        Misfit as `pick` returns it, and the logarithm of the likelihood.
+    """
+
+    component: NDArray[np.int16]
+    misfit: Singles
+    likelihood: Singles
 
 
 def pick(components: Table, evidence: Singles, noise: Singles | None) -> tuple[NDArray[np.int16], Singles]:
@@ -30,15 +48,26 @@ def pick(components: Table, evidence: Singles, noise: Singles | None) -> tuple[N
     (patch,) float32
         Misfit: the mean of the squared whitened samples, which is about 1 if the component explains the patch.
     """
-    count, size = len(evidence), len(components.rows)
-    best = np.full(count, -np.inf, np.float32)
-    component = np.zeros(count, np.int16)
-    misfit = np.empty(count, np.float32)
+    count = len(evidence)
+    choice = Choice(np.zeros(count, np.int16), np.empty(count, np.float32), np.full(count, -np.inf, np.float32))
+    # Without a pilot there are few patches, so that every component is a candidate.
+    candidates = np.ones((len(components.values), count), bool) if noise is None else _candidates(components, evidence)
+    _compare(components, evidence, noise, candidates, choice)
+    sectors = components.trained + len(components.aliased)
+    if noise is not None and components.mix.lines:
+        candidates[:sectors], candidates[sectors:] = False, choice.misfit > UNEXPLAINED
+        _compare(components, evidence, noise, candidates, choice)
+    return choice.component, choice.misfit
+
+
+def _compare(
+    components: Table, evidence: Singles, noise: Singles | None, candidates: NDArray[np.bool_], choice: Choice
+) -> None:
+    """Replace the choice of each patch by a likelier one among `candidates` (component, patch)."""
+    size = len(components.rows)
     width = size if noise is None else size + 4
     # These arrays are reused for all blocks, because allocating them anew would take as long as the sums.
     block, reads = (np.empty((BLOCK, columns), np.float32) for columns in (evidence.shape[1], width))
-    # Without a pilot there are few patches, so that every component is a candidate.
-    candidates = np.ones((len(components.values), count), bool) if noise is None else _candidates(components, evidence)
     components.make_whitenings(np.flatnonzero(candidates.any(axis=1)).tolist())
     for k, group in ((k, group) for k, row in enumerate(candidates) for group in blocks(np.flatnonzero(row))):
         whitening = components.whitening(k)
@@ -51,10 +80,10 @@ def pick(components: Table, evidence: Singles, noise: Singles | None) -> tuple[N
             innovation = read[:, size:].T.copy()
             spread = noise[group] + whitening.spread[:, None].astype(np.float32)
             likelihood -= 0.5 * (np.log(spread.prod(axis=0)) + (innovation * innovation / spread).sum(axis=0))
-        wins = likelihood > best[group]
+        wins = likelihood > choice.likelihood[group]
         winners = group[wins]
-        best[winners], component[winners], misfit[winners] = likelihood[wins], k, square[wins] / size
-    return component, misfit
+        choice.likelihood[winners], choice.component[winners] = likelihood[wins], k
+        choice.misfit[winners] = square[wins] / size
 
 
 def blocks(index: NDArray[np.intp], length: int = BLOCK) -> Iterator[NDArray[np.intp]]:
@@ -66,11 +95,11 @@ def _candidates(components: Table, evidence: Singles) -> NDArray[np.bool_]:
     """Return which components may be the likeliest, (component, patch).
 
     A trained component may be if its approximate likelihood (`Table.quick`) is near the largest. Fine lines may be if
-    the pilot has a colour that lines would have.
+    the pilot has a colour that lines would have. Oblique lines are no candidates here.
     """
     size = len(components.rows)
     trained = components.trained
-    candidates = np.empty((len(components.values), len(evidence)), np.bool_)
+    candidates = np.zeros((len(components.values), len(evidence)), np.bool_)
     count = components.directions.shape[1]
     starts = np.cumsum([0, *range(count, 0, -1)]).tolist()
     products = np.empty((components.quick.shape[1], BLOCK), np.float32)
@@ -93,5 +122,5 @@ def _candidates(components: Table, evidence: Singles) -> NDArray[np.bool_]:
         if components.mix.lines:
             light = (rows[:, size + 1 :] - components.sampling.black).T
             seen = np.abs(components.aliased @ light) > components.least_aliased @ light
-            candidates[trained:, first : first + BLOCK] = seen
+            candidates[trained : trained + len(seen), first : first + BLOCK] = seen
     return candidates
