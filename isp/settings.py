@@ -125,9 +125,12 @@ class WhiteReading:
         What W would read at every pixel [standard deviations of the noise of a sample of W].
     lines : (rows, columns) float
         Certainty, 0 to 1, that grey lines two pixels apart make the colour that the samples of a tile show.
+    window_shares : (rows, columns, channel) float
+        Like `shares`, in the window of each tile by which the guide reads samples as W.
     """
 
     raw: RawImage
     shares: NDArray[np.floating]
     guide: NDArray[np.floating]
     lines: NDArray[np.floating]
+    window_shares: NDArray[np.floating]

@@ -9,7 +9,8 @@
 | 3.1.3, W in place of luminance | `isp.substitution` |
 | 3.2, the conventional camera | `pipeline.picture_bayer` |
 
-Three modules aren't in the paper: `panchromatic` reads every sample as W, and this one plane guides all channels;
-`brightest` limits how bright a sample may be to count; `edges` sharpens. `kernel` computes the same formulas in Dr.Jit,
-and is tested against `numpy_form` and the NumPy forms of the others.
+Four modules aren't in the paper: `panchromatic` reads every sample as W, and this one plane guides all channels;
+`brightest` limits how bright a sample may be to count; `thin` gives planes the light of which they have no sample;
+`edges` sharpens. `kernel` computes the same formulas in Dr.Jit, and is tested against `numpy_form` and the NumPy forms
+of the others.
 """

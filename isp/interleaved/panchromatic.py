@@ -92,8 +92,8 @@ def read_as_white(raw: RawImage, neutral: Floats) -> WhiteReading:
     ratios = np.asarray(neutral, np.float64) / neutral[white]
     raw = with_full_white(raw, ratios)
     if backend() == "numpy":
-        shares, guide_e, lines = _read_numpy(raw, ratios, white)
-        return WhiteReading(raw, shares, stabilise_channel(guide_e, raw, raw.channels[white]), lines)
+        shares, guide_e, lines, of_window = _read_numpy(raw, ratios, white)
+        return WhiteReading(raw, shares, stabilise_channel(guide_e, raw, raw.channels[white]), lines, of_window)
     return WhiteReading(raw, *guide_frame(raw, ratios, white))
 
 
@@ -140,8 +140,8 @@ def _comb(steps: range) -> Floats:
     return np.asarray(weights / weights.sum())
 
 
-def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floats, Floats]:
-    """Compute the surroundings' shares, the guide [e-] and the weight of lines.
+def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Compute the surroundings' shares, the guide [e-], the weight of lines, and the windows' shares.
 
     This form uses double precision, `.kernel.panchromatic` single.
     """
@@ -202,7 +202,7 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
     inverse = 1.0 / (own_variance + around_variance)
     detail = np.maximum(_box(difference**2 * inverse, DETAIL_PX) - 1.0, 0.0) / _box(inverse, DETAIL_PX)
     trusted = detail + around_variance
-    return surroundings, around + trusted / (trusted + own_variance) * difference, lines
+    return surroundings, around + trusted / (trusted + own_variance) * difference, lines, shares
 
 
 def _without_lines(means: Floats, error: Floats, around: Floats, light: Floats, raw: RawImage) -> tuple[Floats, Floats]:

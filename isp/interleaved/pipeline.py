@@ -6,6 +6,7 @@ from isp.colour.white_balance import WhiteBalance
 from isp.interleaved.edges import sharpen
 from isp.interleaved.reconstruction import reconstruct_with_noise
 from isp.interleaved.saturation import saturated_fraction
+from isp.interleaved.thin import follow_samples
 from isp.picture import Picture, finish, require_letters
 from isp.planes import bilinear, rows_at
 from isp.settings import DEFAULTS, PAPER, Settings
@@ -57,7 +58,8 @@ def picture_interleaved(
     noise = relative_noise(raw, result.estimate, result.noise_gain, gains, colours)
     snr = green_snr(raw, result.estimate)
     weight = substitution_weight(snr, substitution_snr)
-    planes = sharpen(result.white, result.estimate, gains, result.noise_gain)
+    planes = follow_samples(result.white, result.estimate, result.noise_gain)
+    planes = sharpen(result.white, planes, gains, result.noise_gain)
     balanced = clip_highlights(raw, planes * gains, gains)
     rgb = balanced @ matrix_with_white(colours, noise, weight).T
     return Picture(rgb, sources, engine=result.engine, snr=snr, substitution=weight)

@@ -142,33 +142,34 @@ class Frame:
 
 
 def guide_frame(raw: RawImage, ratios: Floats, white: int) -> tuple[NDArray[np.float32], ...]:
-    """Compute the surroundings' shares, the guide [units of W's noise], and the weight of lines.
+    """Compute the surroundings' shares, the guide [units of W's noise], the weight of lines, and the windows' shares.
 
-    The shapes are (tile row, tile column, channel), (h, w) and (tile row, tile column). The formulas are those of
-    `isp.interleaved.panchromatic.read_as_white`.
+    The shapes are (tile row, tile column, channel), (h, w), (tile row, tile column), and that of the first again. The
+    formulas are those of `isp.interleaved.panchromatic.read_as_white`.
     """
     height, width = raw.shape
     down, across = len(raw.cfa), len(raw.cfa[0])
     frame = Frame(raw, [raw.channels.index(name) for line in raw.cfa for name in line], white, ratios)
     shares = np.empty((-(-height // down), -(-width // across), len(ratios)), np.float32)
     guide = np.empty((height, width), np.float32)
-    weights = np.empty(shares.shape[:2], np.float32)
+    weights, of_windows = np.empty(shares.shape[:2], np.float32), np.empty_like(shares)
     # Rows on which a pixel depends: windows of the surroundings, in tiles, tents, and the window of detail.
     reach = (window_steps(down)[-1] + surroundings_steps(down)[-1] + 6) * down
     step = max(BAND_PIXELS // width // down, 1) * down
     for first in range(0, height, step):
         last = min(first + step, height)
         start, end = max(first - reach, 0), min(last + reach, height)
-        of_band, lines, guide_e = _guide_band(frame, (start, end), slice(first - start, last - start))
+        of_band, lines, windows, guide_e = _guide_band(frame, (start, end), slice(first - start, last - start))
         guide[first:last] = stabilise_channel(guide_e, raw, raw.channels[white])
         inside = slice((first - start) // down, -(-(last - start) // down))
         shares[first // down : -(-last // down)] = of_band[inside, :, : len(ratios)]
         weights[first // down : -(-last // down)] = lines[inside]
-    return shares, guide, weights
+        of_windows[first // down : -(-last // down)] = windows[inside, :, : len(ratios)]
+    return shares, guide, weights, of_windows
 
 
 def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDArray[np.float32], ...]:
-    """Compute a band of rows: surroundings' shares, weight of lines, and the guide g of the rows `inside`.
+    """Compute a band of rows: surroundings' shares, weight of lines, windows' shares, and the guide g of `inside`.
 
     The guide is in electrons of W. x, v, N, t, T, D and g are those of `isp.interleaved.panchromatic.read_as_white`.
     """
@@ -237,8 +238,9 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     guide = mean + trusted / (trusted + own_variance) * difference
     dr.eval(guide)
     by_tile = -(-height // down), -(-width // across)
-    surroundings, weights = around.numpy().reshape(*by_tile, -1), lines_weight.numpy().reshape(by_tile)
-    return surroundings, weights, guide.numpy().reshape(height, width)[inside]
+    surroundings, of_windows = (values.numpy().reshape(*by_tile, -1) for values in (around, shares))
+    weights = lines_weight.numpy().reshape(by_tile)
+    return surroundings, weights, of_windows, guide.numpy().reshape(height, width)[inside]
 
 
 def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Float, dark: float) -> tuple[Float, ...]:

@@ -38,7 +38,7 @@ def read(raw, colour=COLOUR):
     """The frame as `isp.interleaved.panchromatic` reads it where all around has one colour."""
     tiles = [-(-length // size) for length, size in zip(raw.shape, (len(raw.cfa), len(raw.cfa[0])), strict=True)]
     shares = np.broadcast_to(np.float32(colour / colour[3]), (*tiles, 4)).copy()
-    return WhiteReading(raw, shares, np.zeros(raw.shape, np.float32), np.zeros(tiles, np.float32))
+    return WhiteReading(raw, shares, np.zeros(raw.shape, np.float32), np.zeros(tiles, np.float32), shares)
 
 
 def shaded(light):

@@ -193,12 +193,14 @@ def test_both_engines_agree(tile, monkeypatch):
         assert kernel.shares == pytest.approx(twin.shares, rel=1e-4), shape
         assert kernel.guide == pytest.approx(twin.guide, rel=1e-4, abs=1e-3), shape
         assert kernel.lines == pytest.approx(twin.lines, abs=1e-3), shape
+        assert kernel.window_shares == pytest.approx(twin.window_shares, rel=1e-3), shape
         monkeypatch.setattr("isp.interleaved.kernel.panchromatic.BAND_PIXELS", 7 * shape[1])
         bands = read_as_white(raw, neutral_of(raw))
         monkeypatch.undo()
         assert np.array_equal(bands.guide, kernel.guide), shape
         assert np.array_equal(bands.shares, kernel.shares), shape
         assert np.array_equal(bands.lines, kernel.lines), shape
+        assert np.array_equal(bands.window_shares, kernel.window_shares), shape
 
 
 LAMPS = [(1, 1), (1, 2), (1, 3), (1, 4), (1, 5), (3, 1), (5, 1), (2, 2), (2, 5), (4, 4), (3, 3), (2, 3)]
