@@ -1,4 +1,4 @@
-r"""Frames to train the network of `corrected_ple` on: pictures that judge nothing, developed by `ple`.
+r"""Frames to train the network of `isp.processors.corrected` on: pictures that judge nothing, developed by `ple`.
 
     python benchmarks/net_frames.py out/net --groups 40        (a group: one camera and lamp, both mosaics)
     python benchmarks/net_frames.py out/net --photographs out/photographs         (of net_photographs.py)
@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from corrected_ple import correction_inputs
 from net_photographs import is_held, mean_of_squares
 from numpy.typing import NDArray
 from PIL import Image
@@ -29,6 +28,7 @@ from skimage import data
 from isp.colour.white_balance import WhiteBalance
 from isp.ple.prior import own_prior
 from isp.processors.catalogue import PROCESSORS
+from isp.processors.corrected import correction_inputs
 from isp.processors.piecewise import develop_planes
 from render.illuminants import illuminant
 from render.radiance_files.surface_spectra import surface_reflectances

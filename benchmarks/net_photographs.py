@@ -1,4 +1,4 @@
-"""Photographs to train the network of `corrected_ple` on: which they are, and their folder out of clones.
+"""Photographs to train the network of `isp.processors.corrected` on: which they are, and their folder out of clones.
 
     git clone https://github.com/OWNER/NAME CLONES/OWNER/NAME       (each repository of net_photographs.toml; bare does)
     python benchmarks/net_photographs.py CLONES out/photographs
@@ -28,7 +28,7 @@ from rodcone.errors import InputError
 from rodcone.types import Floats
 
 LIST = Path(__file__).with_suffix(".toml")
-LONGEST = 2000  # pixels
+LONGEST = 4000  # pixels
 ONE_HELD_IN = 10
 
 

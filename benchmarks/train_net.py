@@ -1,4 +1,4 @@
-r"""Train the network of `corrected_ple` on both mosaics at once (needs torch, for this alone).
+r"""Train the network of `isp.processors.corrected` on both mosaics at once (needs torch, for this alone).
 
     pip install rodcone[train-net]
     python benchmarks/net_frames.py out/net --photographs out/photographs --groups 100 --held 8
@@ -22,12 +22,13 @@ from typing import Any
 
 import numpy as np
 import torch
-from corrected_ple import INPUTS, LEAK, STEPS, pack, unpack
 from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-SEED, BATCH, SIDE, RATE, WARM = 0, 8, 96, 4e-4, 300
+from isp.processors.corrected import INPUTS, LEAK, STEPS, pack, unpack
+
+SEED, BATCH, SIDE, RATE, WARM = 0, 8, 96, 6e-4, 300
 LEAST_MSE, LEAST_STEP_MSE = 1e-5, 1e-5  # 50 dB: beyond it a crop counts no more
 STRUCTURE = 0.5  # weight of the error of differences between neighbours, so that stripes count more than tints
 LUMINANCE = 0.25  # weight of the error of luminance, which an eye sees finest
@@ -41,7 +42,7 @@ NAMES = ("network", "control")
 
 
 class Network(nn.Module):
-    """The layers of `corrected_ple.residual`."""
+    """The layers of `isp.processors.corrected.residual`."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,5 +1,6 @@
 """Pictures to choose settings on: leaves, gratings and patches of random reflectances, which no page judges on."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise, product
 
@@ -66,16 +67,21 @@ def reflectance(rng: np.random.Generator, depth: float) -> Floats:
     return np.asarray(curve.band_average(NM, band_widths(NM)) * rng.uniform(0.3, 1.0))
 
 
-def leaves(rng: np.random.Generator, side: int, depth: float) -> NDArray[np.float64]:
+def leaves(
+    rng: np.random.Generator,
+    side: int,
+    depth: float,
+    draw: Callable[[np.random.Generator, float], Floats] = reflectance,
+) -> NDArray[np.float64]:
     """Discs over each other whose areas follow a power law, so that detail is alike at every scale."""
     rows, columns = np.indices((side, side))
-    picture = np.broadcast_to(reflectance(rng, depth), (side, side, NM.size)).copy()
+    picture = np.broadcast_to(draw(rng, depth), (side, side, NM.size)).copy()
     smallest, largest = SMALLEST * FINER, LARGEST * FINER
     for _ in range(1500):
         u = rng.uniform()  # radius density r^-3
         radius = 1 / np.sqrt(u / smallest**2 + (1 - u) / largest**2)
         row, column = rng.uniform(-radius, side + radius, 2)
-        picture[(rows - row) ** 2 + (columns - column) ** 2 < radius**2] = reflectance(rng, depth)
+        picture[(rows - row) ** 2 + (columns - column) ** 2 < radius**2] = draw(rng, depth)
     return picture
 
 

@@ -15,7 +15,7 @@ MOST = 12  # largest number of trained candidates per patch
 
 
 @dataclass(frozen=True)
-class Choice:
+class PickedComponents:
     """The likeliest component of each patch so far.
 
     Attributes
@@ -49,7 +49,9 @@ def pick(components: Table, evidence: Singles, noise: Singles | None) -> tuple[N
         Misfit: the mean of the squared whitened samples, which is about 1 if the component explains the patch.
     """
     count = len(evidence)
-    choice = Choice(np.zeros(count, np.int16), np.empty(count, np.float32), np.full(count, -np.inf, np.float32))
+    choice = PickedComponents(
+        np.zeros(count, np.int16), np.empty(count, np.float32), np.full(count, -np.inf, np.float32)
+    )
     # Without a pilot there are few patches, so that every component is a candidate.
     candidates = np.ones((len(components.values), count), bool) if noise is None else _candidates(components, evidence)
     _compare(components, evidence, noise, candidates, choice)
@@ -61,7 +63,7 @@ def pick(components: Table, evidence: Singles, noise: Singles | None) -> tuple[N
 
 
 def _compare(
-    components: Table, evidence: Singles, noise: Singles | None, candidates: NDArray[np.bool_], choice: Choice
+    components: Table, evidence: Singles, noise: Singles | None, candidates: NDArray[np.bool_], choice: PickedComponents
 ) -> None:
     """Replace the choice of each patch by a likelier one among `candidates` (component, patch)."""
     size = len(components.rows)

@@ -17,6 +17,7 @@ from isp.interleaved.pipeline import picture_bayer, picture_interleaved, picture
 from isp.picture import Picture
 from isp.processors.any_mosaic import picture_any_mosaic
 from isp.processors.bayer_denoised import picture_bayer_nlm, picture_demosaicked_first, picture_denoised_first
+from isp.processors.corrected import picture_corrected_bayer, picture_corrected_rgbw
 from isp.processors.demosaic import EXTRA as DEMOSAICKING
 from isp.processors.demosaic import malvar, menon, picture_demosaicked
 from isp.processors.fusion import picture_complementary, picture_kijima, picture_sato, picture_yamagami
@@ -123,6 +124,7 @@ _PARK = partial(picture_denoised_first, mix=principal_components, demosaic=resid
 _RESIDUAL_BM3D = partial(picture_demosaicked_first, demosaic=residual_interpolation)
 _EARLY = "W as luminance by early fusion"
 _PIECEWISE = "piecewise linear: Yu, Sapiro & Mallat 2012 with a fixed prior, Zoran & Weiss 2011"
+_CORRECTED = "ple, corrected by a small network that was trained for RGBW and Bayer alike"
 _ANY = "interleaved reconstruction, a matrix over all channels; one or two give a grey picture"
 # Processors with the plain matrix of their publications. The first is the default; the next two are the paper's
 # cameras.
@@ -167,6 +169,8 @@ _PLAIN: Mapping[str, Processor] = MappingProxyType(
         "any_mosaic": Processor(OWN, picture_any_mosaic, _ANY, on_backend=True, colours=(), unit=""),
         "ple_rgbw": Processor("rgbw", picture_ple_rgbw, _PIECEWISE),
         "ple_bayer": Processor("bayer", picture_ple_bayer, _PIECEWISE),
+        "ple_rgbw_net": Processor("rgbw", picture_corrected_rgbw, _CORRECTED),
+        "ple_bayer_net": Processor("bayer", picture_corrected_bayer, _CORRECTED),
     }
 )
 _GAINS = measured_gains()

@@ -20,6 +20,8 @@ CAMERA_NAMES = {
     "bayer": "Bayer (bilinear)",
     "ple_rgbw": "RGBW (PLE)",
     "ple_bayer": "Bayer (PLE)",
+    "ple_rgbw_net": "RGBW (PLE and network)",
+    "ple_bayer_net": "Bayer (PLE and network)",
 }
 BALANCE_NAMES = {AS_SHOT: "balanced as shot", GRAY_WORLD: "balanced by Gray World"}
 BALANCE_MEANINGS = {AS_SHOT: "the scene's light is known", GRAY_WORLD: "the picture's mean is taken for grey"}

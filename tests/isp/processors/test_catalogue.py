@@ -161,6 +161,7 @@ def test_a_processor_whose_matrix_was_published_plain_is_named_with_and_without_
     assert plain == {
         *("interleaved", "interleaved_paper", "bayer", "bayer_nlm"),
         *("rccb", "rccc", "ryyb", "mono", "any_mosaic", "ple_rgbw", "ple_bayer", "ple"),
+        *("ple_rgbw_net", "ple_bayer_net"),
     }
     assert set(NAMED) == {*PROCESSORS, *(f"{name}_published" for name in {*PROCESSORS} - plain - {"bayer_bilinear"})}
     for name in set(NAMED) - set(PROCESSORS):

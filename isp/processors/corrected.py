@@ -1,16 +1,13 @@
-r"""Piecewise linear estimation, corrected by a small learned network, the same for RGBW and Bayer: a trial.
+"""Piecewise linear estimation, corrected by a small network that was trained for RGBW and Bayer alike.
 
-    rodcone develop shot.dng --isp benchmarks/corrected_ple.py:ple_rgbw_net --trust-code      (or :ple_bayer_net)
-
-The network sees `ple`'s picture, the mosaic and its noise, and adds a residual to the picture's encoded sRGB. It is a
-U-net (O. Ronneberger, P. Fischer, T. Brox, MICCAI 2015) over tiles of 2x2 pixels. Everything is relative to the
-picture's white and in standard deviations of the noise, so that one set of weights serves any sensor and light. It is
-trained to give what exact planes of R, G and B become by the camera's own matrix: it changes what the mosaic and the
-noise hid, and leaves the choice of colours to the matrix. `train_net.py` writes the weights, which the package doesn't
-bring: docs/decisions/0061 says why. `CORRECTED_PLE` names their file, out/net/network.npz where it is left out.
+The network sees the picture of `isp.processors.piecewise`, the mosaic and its noise, and adds a residual to the
+picture's encoded sRGB. It is a U-net (O. Ronneberger, P. Fischer, T. Brox, MICCAI 2015) over tiles of 2x2 pixels.
+Everything is relative to the picture's white and in standard deviations of the noise, so that one set of weights serves
+any sensor and light. It is trained to give what exact planes of R, G and B become by the camera's own matrix: it
+changes what the mosaic and the noise hid, and leaves the choice of colours to the matrix
+(docs/decisions/0061). `benchmarks/train_net.py` wrote the weights; what they were trained on is `card`.
 """
 
-import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -25,10 +22,10 @@ from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture
 from isp.ple.prior import own_prior
-from isp.processors.catalogue import Processor
 from isp.processors.convolution import convolve
 from isp.processors.demosaic import require_bayer
 from isp.processors.piecewise import PiecewisePicture, develop_planes
+from isp.strips import strips
 from rodcone.colour_spaces import decode_srgb, encode_srgb, white_of
 from rodcone.errors import InputError
 from rodcone.types import Image, Singles
@@ -41,7 +38,10 @@ TILES = 8  # pixels: both sides of a frame are brought to a multiple of it
 MOST_MISFIT = 5.0  # standard deviations by which a sample may lie beside the picture
 MISFIT_UNIT = 3.0  # standard deviations that are a misfit of 1
 LEAST_NOISE_E = 1e-3
-WEIGHTS = Path(os.environ.get("CORRECTED_PLE", "out/net/network.npz"))
+OWN = Path(__file__).with_name("corrected.npz")  # weights for both mosaics, in half precision
+CARD = "card"  # name of the text in that file
+STRIP_ROWS = 512  # rows that are corrected together, so that features of a whole frame never fill the memory
+REACH = 64  # rows beyond a strip on which its pixels depend: 56, and what halves of tiles round up
 # Names of the layers, with what each takes from the one before: a step of 2 goes to half the size.
 STEPS = MappingProxyType(
     {
@@ -60,7 +60,7 @@ Weights = Mapping[str, Singles]
 
 
 def picture_corrected_rgbw(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
-    """Develop an RGBW raw image whose tile has R and W on a diagonal; as `picture_ple_rgbw`, corrected.
+    """Develop an RGBW raw image whose tile has R and W on a diagonal, as `picture_ple_rgbw` does, and correct it.
 
     Raises
     ------
@@ -76,16 +76,22 @@ def picture_corrected_rgbw(raw: RawImage, colours: ColourFit, *, balance: WhiteB
 
 
 def picture_corrected_bayer(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
-    """Develop a Bayer raw image; as `picture_ple_bayer`, corrected."""
+    """Develop a Bayer raw image as `picture_ple_bayer` does, and correct it."""
     require_bayer(raw.cfa)
     return corrected(raw, develop_planes(raw, colours, balance, own_prior()), own_weights())
 
 
 @cache
 def own_weights() -> Weights:
-    """Weights for both mosaics, in half precision on disk."""
-    with np.load(WEIGHTS) as file:
-        return MappingProxyType({name: file[name].astype(np.float32) for name in file.files if name != "card"})
+    """Return the project's own weights, by layer."""
+    with np.load(OWN) as file:
+        return MappingProxyType({name: file[name].astype(np.float32) for name in file.files if name != CARD})
+
+
+def card() -> str:
+    """Return what the project's own weights were trained on, for how long, and by which seed."""
+    with np.load(OWN) as file:
+        return str(file[CARD])
 
 
 def corrected(raw: RawImage, developed: PiecewisePicture, weights: Weights) -> Picture:
@@ -102,8 +108,13 @@ def corrected(raw: RawImage, developed: PiecewisePicture, weights: Weights) -> P
         seen, phase = seen.swapaxes(0, 1), phase[::-1]
     shape = seen.shape[:2]
     sides = [(offset, -(length + offset) % TILES) for length, offset in zip(shape, phase, strict=True)]
-    packed = pack(np.pad(seen, [*sides, (0, 0)], mode="reflect"))  # reflection keeps the mosaic
-    change = unpack(residual(packed, weights))[phase[0] :, phase[1] :][: shape[0], : shape[1]]
+    wide = np.pad(seen, [*sides, (0, 0)], mode="reflect")  # reflection keeps the mosaic
+    change = np.empty((*wide.shape[:2], 3), np.float32)
+    for rows in strips(len(wide), STRIP_ROWS):
+        top = max(rows.start - REACH, 0)
+        found = unpack(residual(pack(wide[top : rows.stop + REACH]), weights))
+        change[rows] = found[rows.start - top :][: rows.stop - rows.start]
+    change = change[phase[0] :, phase[1] :][: shape[0], : shape[1]]
     change = change.swapaxes(0, 1) if transposed else change
     return Picture(added(picture.rgb, change.astype(np.float64), white), picture.balance)
 
@@ -161,7 +172,7 @@ def unpack(tiles: Singles) -> Singles:
 
 
 def residual(packed: Singles, weights: Weights) -> Singles:
-    """Run the network on tiles (h, w, 4 INPUTS), both sides a multiple of 4; its residual, (h, w, 12)."""
+    """Return the network's residual (h, w, 12) for tiles (h, w, 4 INPUTS); both sides are a multiple of 4."""
     with ThreadpoolController().limit(limits=1, user_api="blas"), ThreadPoolExecutor(cpu_count()) as threads:
 
         def layer(name: str, values: Singles) -> Singles:
@@ -202,8 +213,3 @@ def _white_diagonal(tile: Tile) -> bool:
 def _green_below(tile: Tile) -> bool:
     """Whether G follows R in the column and not in the row."""
     return not any(set(row) == {"R", "G"} for row in tile)
-
-
-_SOURCE = "ple, corrected by a small network of the project's own"
-ple_rgbw_net = Processor("rgbw", picture_corrected_rgbw, _SOURCE)
-ple_bayer_net = Processor("bayer", picture_corrected_bayer, _SOURCE)

@@ -1,6 +1,5 @@
 """A picture corrected by a network: its layers beside plain sums, each phase of a tile, and what is left as it is."""
 
-import corrected_ple as corrected
 import numpy as np
 import pytest
 from builders import BAYER_PHASES, RGBW_PHASES, raw_image
@@ -10,6 +9,7 @@ from scipy.signal import correlate
 from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture
+from isp.processors import corrected
 from isp.processors.piecewise import PiecewisePicture
 from rodcone.colour_spaces import decode_srgb, encode_srgb, white_of
 from sensor.cfa import channels, mask
@@ -89,6 +89,17 @@ def test_the_network_is_what_plain_sums_give() -> None:
     found = corrected.residual(packed, weights)
     assert np.abs(expected).max() > 1
     assert found == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
+
+
+def test_strips_of_a_frame_are_what_the_whole_gives(monkeypatch) -> None:
+    weights = random_network()
+    raw, made = developed(RGBW_PHASES[3], (233, 26))
+    whole = corrected.corrected(raw, made, weights).rgb
+    for rows in (8, 72, 128):
+        monkeypatch.setattr(corrected, "STRIP_ROWS", rows)
+        assert corrected.corrected(raw, made, weights).rgb == pytest.approx(whole, rel=1e-4), rows
+    monkeypatch.setattr(corrected, "REACH", 32)
+    assert corrected.corrected(raw, made, weights).rgb != pytest.approx(whole, rel=1e-4), "pixels there depend on it"
 
 
 def test_a_network_without_a_residual_leaves_the_picture_to_the_bit() -> None:
