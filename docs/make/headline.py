@@ -4,13 +4,15 @@
 
 or, where the packages of `headline_photographs` lie in a folder, ``headline.py study PACKAGES FOLDER``, ``rodcone sweep
 FOLDER/study.toml -o SWEPT --as-stated`` and ``headline.py page PACKAGES SWEPT``. It writes two tables, headline.csv and
-headline_pictures.csv, a part of docs/white_pixel.md, and the figures that README quotes. Three leads are kept apart:
+headline_pictures.csv, a part of docs/white_pixel.md, and the figures that README quotes. Five leads are kept apart:
 
 mosaic      `ple` on RGBW over `ple` on Bayer: one method, so that the mosaic alone differs.
+learned     the same of `ple` corrected by a network that was trained for both mosaics by the same steps and pictures.
+paper       the same of the paper's reconstruction, `interleaved` over `bayer_nlm`, which removes noise by its means.
 processing  the best Bayer processor over `ple`, both on Bayer: what another processor brings the same mosaic. It is one
             for each level, `BEST_BAYER`, chosen by PSNR on the other pictures of docs/results/white_pixel.csv among
             those without BM3D, which takes twenty times as long and brings 0.4 to 0.8 dB more by day there.
-both        `ple` on RGBW over the best Bayer processor: the first less the second.
+both        the best RGBW processor, `BEST_RGBW`, over the best Bayer processor, both learned by day.
 
 Photographs whose exact R, G and B stay under `CEILING_DB` by the camera's own colour matrix are out: they measure the
 matrix. Of the others the eight with the least SHA-256 are held out, and the rest is the sample. Beside it are scenes
@@ -53,6 +55,7 @@ CEILING_DB = 35.0
 HELD_OUT = 8
 DRAWN_FROM, DRAWN = "a10b90d1976c883d4665a3a53be4b0804f9563ba", 3  # a commit from before the first of these tables
 RGBW, BAYER = "ple_rgbw", "ple_bayer"
+PAIRS = {"mosaic": (RGBW, BAYER), "learned": ("ple_rgbw_net", "ple_bayer_net"), "paper": ("interleaved", "bayer_nlm")}
 BEST_BAYER = {
     "0.05cd/m2": BAYER,
     "0.5cd/m2": BAYER,
@@ -61,7 +64,8 @@ BEST_BAYER = {
     "1000cd/m2": "bayer_net",
 }
 LEVELS = tuple(BEST_BAYER)
-LEADS = ("mosaic", "processing", "both")
+BEST_RGBW = dict.fromkeys(BEST_BAYER, "ple_rgbw_net")
+LEADS = (*PAIRS, "processing", "both")
 CHART = "color_checker"
 # Figures with their names, decimals on the page, and whether more is better.
 FIGURES = {
@@ -169,7 +173,7 @@ def write_study(packages: str, folder: str) -> None:
     values = {
         "scenes": [*(f"{photograph.name}.png" for photograph in used), *drawn, CHART],
         "levels": LEVELS,
-        "processors": [RGBW, BAYER, f"{wheel.resolve()}:bayer_net"],
+        "processors": [*(name for pair in PAIRS.values() for name in pair), f"{wheel.resolve()}:bayer_net"],
         "size": SIDE,
     }
     text = STUDY.format(**{key: json.dumps(value) for key, value in values.items()})
@@ -201,7 +205,7 @@ def mean_delta_e(picture: Floats, truth: Floats) -> float:
 def cameras_of(lead: str, level: str) -> tuple[str, str]:
     """Return the two cameras that a lead compares at a level."""
     best = BEST_BAYER[level]
-    return {"mosaic": (RGBW, BAYER), "processing": (best, BAYER), "both": (RGBW, best)}[lead]
+    return {**PAIRS, "processing": (best, BAYER), "both": (BEST_RGBW[level], best)}[lead]
 
 
 def leads(cells: Cells, scenes: Sequence[str], level: str, lead: str, figure: str) -> Floats:

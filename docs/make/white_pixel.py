@@ -10,6 +10,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -29,6 +30,9 @@ from studies.sweep.row import Row
 PAGE = RESULTS.parent / "white_pixel.md"
 STUDY = PAGE.parents[1] / "studies" / "configs" / "white_pixel.toml"
 METRICS = (PSNR, DELTA_E, FLIP)
+Pair = tuple[str, str]  # a camera of RGBW and one of Bayer
+LEARNED: Pair = ("ple_rgbw_net", "ple_bayer_net")  # one network for both mosaics
+BEST: Pair = ("RGBW", "RGB")  # in place of a pair: the best camera of each place by its channels
 # No training picture is among them (studies/training/pictures.py); by the wheel and the folder in it that holds them.
 PHOTOGRAPHS = {
     "china.jpg": "sklearn/datasets/images",
@@ -57,7 +61,7 @@ def write_study(folder: Path) -> None:
         photograph = Image.open(io.BytesIO(content)).convert("RGB")
         photograph.thumbnail((SIDE, SIDE), Image.Resampling.BOX)
         photograph.save(folder / f"{name.partition('.')[0]}.png")
-    cameras = [*WHITE_PIXEL, f"{net.name}:bayer_net", f"{net.name}:bayer_net_bm3d", "bayer_residual_bm3d"]
+    cameras = [*WHITE_PIXEL, *LEARNED, f"{net.name}:bayer_net", f"{net.name}:bayer_net_bm3d", "bayer_residual_bm3d"]
     names = [f"{name.partition('.')[0]}.png" for name in PHOTOGRAPHS]
     text = STUDY.read_text("utf-8").replace("scenes = [", f"scenes = [\n  {json.dumps(names)[1:-1]},", 1)
     (folder / "study.toml").write_text(re.sub(r"processors = .*", f"processors = {json.dumps(cameras)}", text), "utf-8")
@@ -68,7 +72,8 @@ def parts(rows: Iterable[Row], version: str) -> Parts:
     places: dict[tuple[str, str, str], dict[str, Row]] = {}
     for row in rows:
         places.setdefault((row.white_balance, row.scene, row.level), {})[row.processor] = row
-    missing = [camera for camera in WHITE_PIXEL if any(camera not in cameras for cameras in places.values())]
+    needed = (*WHITE_PIXEL, *LEARNED)
+    missing = [camera for camera in needed if any(camera not in cameras for cameras in places.values())]
     if missing or not places:
         raise InputError(f"study: it lacks {' and '.join(missing) or 'rows'}; allowed: the study white_pixel, one seed")
     balances, scenes, levels = (list(dict.fromkeys(axis)) for axis in zip(*places, strict=True))
@@ -80,13 +85,15 @@ def parts(rows: Iterable[Row], version: str) -> Parts:
             f"leads {balance}": markdown_table(["", *head], lead_rows(places, balance, scenes, levels))
             for balance in balances
         },
+        "learned": markdown_table(["", *head], mean_rows(places, balances[0], scenes, levels, LEARNED)),
         "best": markdown_table(["", *head], best_rows(places, balances[0], scenes, levels)),
     }
+    lines = [(balance, balance, WHITE_PIXEL) for balance in balances]
+    lines += [(f"{balances[0]}, learned", balances[0], LEARNED), (f"{balances[0]}, best", balances[0], BEST)]
     charts = {
         f"PSNR, dB: lead, {kind}": {
-            name: np.array([leads(places, PSNR, balance, kept, level, against).mean() for level in levels])
-            for balance in balances
-            for name, against in ((balance, False), (f"{balance}, best Bayer", True))
+            name: np.array([leads(places, PSNR, balance, kept, level, pair).mean() for level in levels])
+            for name, balance, pair in lines
         }
         for kind, kept in kinds(scenes).items()
     }
@@ -109,21 +116,21 @@ def kinds(scenes: Sequence[str]) -> dict[str, list[str]]:
     return {kind: [scene for scene in scenes if kind_of[scene] == kind] for kind in dict.fromkeys(kind_of.values())}
 
 
-def best_bayer(cameras: Mapping[str, Row], metric: Metric) -> Row:
-    """Return the row of the Bayer camera that is best by a metric: those that count electrons in R, G and B alone."""
-    bayer = [row for row in cameras.values() if set(json.loads(row.mean_electrons)) == set("RGB")]
-    return max(bayer, key=lambda row: getattr(row, metric.key) * (1 if metric.higher else -1))
+def best_camera(cameras: Mapping[str, Row], metric: Metric, channels: str) -> Row:
+    """Return the row of the camera that is best by a metric, of those that count electrons in these channels alone."""
+    those = [row for row in cameras.values() if set(json.loads(row.mean_electrons)) == set(channels)]
+    return max(those, key=lambda row: getattr(row, metric.key) * (1 if metric.higher else -1))
 
 
 def leads(
-    places: Places, metric: Metric, balance: str, scenes: Sequence[str], level: str, best: bool = False
+    places: Places, metric: Metric, balance: str, scenes: Sequence[str], level: str, pair: Pair = WHITE_PIXEL
 ) -> np.ndarray:
-    """Return by scene how much better RGBW is than Bayer by the same method, or than the best Bayer of the place."""
+    """Return by scene how much better a pair's RGBW camera is than its Bayer camera; `BEST` is the best of each."""
     found = []
     for scene in scenes:
         cameras = places[balance, scene, level]
-        theirs = best_bayer(cameras, metric) if best else cameras[WHITE_PIXEL[1]]
-        lead = getattr(cameras[WHITE_PIXEL[0]], metric.key) - getattr(theirs, metric.key)
+        ours, theirs = (best_camera(cameras, metric, name) if pair is BEST else cameras[name] for name in pair)
+        lead = getattr(ours, metric.key) - getattr(theirs, metric.key)
         found.append(lead if metric.higher else -lead)
     return np.array(found)
 
@@ -140,18 +147,26 @@ def lead_rows(places: Places, balance: str, scenes: Sequence[str], levels: Seque
     return rows
 
 
-def best_rows(places: Places, balance: str, scenes: Sequence[str], levels: Sequence[str]) -> list[list[str]]:
-    """Return RGBW's mean leads over each place's best Bayer camera, and how often which was the best in PSNR."""
-    rows = [
-        [f"{len(kept)} {kind}", *(mean_cell(places, balance, kept, level, best=True) for level in levels)]
+def mean_rows(
+    places: Places, balance: str, scenes: Sequence[str], levels: Sequence[str], pair: Pair
+) -> list[list[str]]:
+    """Return a pair's mean leads over each kind of scene."""
+    return [
+        [f"{len(kept)} {kind}", *(mean_cell(places, balance, kept, level, pair) for level in levels)]
         for kind, kept in kinds(scenes).items()
     ]
-    for metric in METRICS:
+
+
+def best_rows(places: Places, balance: str, scenes: Sequence[str], levels: Sequence[str]) -> list[list[str]]:
+    """Return mean leads of each place's best RGBW camera over its best Bayer camera, and how often which were these."""
+    rows = mean_rows(places, balance, scenes, levels, BEST)
+    for metric, channels in product(METRICS, BEST):
         cells = []
         for level in levels:
-            best = Counter(best_bayer(places[balance, scene, level], metric).processor for scene in scenes)
+            best = Counter(best_camera(places[balance, scene, level], metric, channels).processor for scene in scenes)
             cells.append(", ".join(f"`{name.rpartition(':')[2]}` {count}" for name, count in best.most_common()))
-        rows.append([f"best by {metric.name.partition(',')[0]}", *cells])
+        mosaic = "RGBW" if "W" in channels else "Bayer"
+        rows.append([f"best {mosaic} by {metric.name.partition(',')[0]}", *cells])
     return rows
 
 
@@ -160,9 +175,9 @@ def written(metric: Metric, lead: float) -> str:
     return f"**{lead_text(metric, lead)}**" if lead <= -metric.threshold else lead_text(metric, lead)
 
 
-def mean_cell(places: Places, balance: str, scenes: Sequence[str], level: str, best: bool = False) -> str:
+def mean_cell(places: Places, balance: str, scenes: Sequence[str], level: str, pair: Pair = WHITE_PIXEL) -> str:
     """Write means of leads over scenes by metric, each with half its 95 % interval."""
-    of_scenes = {metric: leads(places, metric, balance, scenes, level, best) for metric in METRICS}
+    of_scenes = {metric: leads(places, metric, balance, scenes, level, pair) for metric in METRICS}
     return "/".join(
         f"{written(metric, float(x.mean()))}±{fixed(float(half_width(x)), metric.digits)}"
         for metric, x in of_scenes.items()
