@@ -34,7 +34,8 @@ _BORDER = "beyond the border a lens sees the picture's mirror image, which doesn
 _CLAMP = "out of focus the image of a point, sampled once a pixel, has lobes under 0, which are cut"
 _COARSE = "a step of 3922 e⁻ hides 1000 e⁻: without noise as wide as a step, rounding isn't evened out"
 _NEUTRAL = (
-    "light of unknown colour at an edge is drawn neutral, and a neutral of this balance is 10^6 times one channel"
+    "shares are shrunk towards a neutral of this balance, which is 10^6 times one channel; read by such shares, a "
+    "pixel's own sample differs from a plane by over 40 %, and the plane follows it in part, as at a bar one pixel wide"
 )
 _GUIDE = (
     "a sample is read as W by its channel's share of the light around, shrunk towards neutral by the share's error; an "
@@ -60,9 +61,7 @@ LIMITS: Mapping[tuple[str, str], str] = MappingProxyType(
         ): "similarity of noisy samples takes those that noise raised alike together: 0.5 % of a sample's "
         "noise in W at 6 e⁻; from 10 e⁻ a pixel on under 0.1 %, which 48 frames don't tell from none",
         ("red_alone", "pictures unbiased"): _GUIDE,
-        ("crosstalk_25", "pictures unbiased"): _GUIDE,
-        ("balance_1e6", "pictures unbiased"): _GUIDE,
-        ("balance_1e6", "bounded"): _NEUTRAL,
+        ("balance_1e6", "pictures unbiased"): _NEUTRAL,
         ("largest_number", "linear"): "the readout holds means at 1e30 e⁻, over any well",
         (
             "read_noise_0",
