@@ -139,7 +139,7 @@ def test_leads_are_positive_where_the_first_is_better_and_both_is_of_the_best() 
         assert leads(of, ["a", "c"], "100cd/m2", "both", figure) == pytest.approx([2.0, 4.0])
         assert leads(of, ["a", "c"], "5cd/m2", "learned", figure) == pytest.approx([4.0, 6.0])
         assert leads(of, ["a", "c"], "5cd/m2", "paper", figure) == pytest.approx([5.5, 8.5])
-    assert cameras_of("both", "0.05cd/m2") == ("ple_rgbw_net", BAYER)
+    assert cameras_of("both", "0.05cd/m2") == PAIRS["learned"]
 
 
 def test_both_intervals_by_hand() -> None:
