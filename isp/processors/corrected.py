@@ -5,7 +5,7 @@ picture's encoded sRGB. It is a U-net (O. Ronneberger, P. Fischer, T. Brox, MICC
 Everything is relative to the picture's white and in standard deviations of the noise, so that one set of weights serves
 any sensor and light. It is trained to give what exact planes of R, G and B become by the camera's own matrix: it
 changes what the mosaic and the noise hid, and leaves the choice of colours to the matrix
-(docs/decisions/0061). `benchmarks/train_net.py` wrote the weights; what they were trained on is `card`.
+(docs/decisions/0068). `benchmarks/train_net.py` wrote the weights; `card` says what they were trained on.
 """
 
 from collections.abc import Mapping
@@ -16,8 +16,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
+from isp.blas import one_thread
 from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture
@@ -173,7 +173,7 @@ def unpack(tiles: Singles) -> Singles:
 
 def residual(packed: Singles, weights: Weights) -> Singles:
     """Return the network's residual (h, w, 12) for tiles (h, w, 4 INPUTS); both sides are a multiple of 4."""
-    with ThreadpoolController().limit(limits=1, user_api="blas"), ThreadPoolExecutor(cpu_count()) as threads:
+    with one_thread(), ThreadPoolExecutor(cpu_count()) as threads:
 
         def layer(name: str, values: Singles) -> Singles:
             filters = weights[f"{name}.weight"]
