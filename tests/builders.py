@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from isp.processors import network
 from isp.processors.catalogue import NAMED, libraries
+from isp.settings import WhiteReading
 from render.error_estimates import Halves
 from render.level import Irradiance, SceneMeans
 from render.scene import LightGroup
@@ -71,6 +72,18 @@ def mosaic_of(planes: Mapping[str, ArrayLike], cfa: Tile, shape: tuple[int, int]
 def behind(planes: NDArray[np.float64], cfa: Tile) -> NDArray[np.float64]:
     """What each site sees of planes (h, w, channel), channels in the mosaic's order."""
     return mosaic_of(dict(zip(channels(cfa), np.moveaxis(planes, -1, 0), strict=True)), cfa, planes.shape[:2])
+
+
+def white_reading(raw: RawImage, colour: ArrayLike, window_shares: NDArray[Any] | None = None) -> WhiteReading:
+    """What `isp.interleaved.panchromatic` reads of a frame whose surroundings have one colour [e-], without lines.
+
+    The windows have the same shares, or those that are given, (row, column, channel) by tile.
+    """
+    tiles = [-(-length // size) for length, size in zip(raw.shape, (len(raw.cfa), len(raw.cfa[0])), strict=True)]
+    of_white = np.asarray(colour)[raw.channels.index("W")]
+    shares = np.broadcast_to(np.float32(colour / of_white), (*tiles, len(raw.channels))).copy()
+    guide, lines = np.zeros(raw.shape, np.float32), np.zeros(tiles, np.float32)
+    return WhiteReading(raw, shares, guide, lines, shares if window_shares is None else window_shares)
 
 
 def even_device(shape: tuple[int, int]) -> Device:

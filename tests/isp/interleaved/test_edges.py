@@ -4,14 +4,13 @@ from itertools import product
 
 import numpy as np
 import pytest
-from builders import RGBW_4X4, RGBW_PHASES, behind, raw_image
+from builders import RGBW_4X4, RGBW_PHASES, behind, raw_image, white_reading
 from scipy.ndimage import gaussian_filter
 
 from isp.interleaved import edges
 from isp.interleaved.edges import sharpen
 from isp.interleaved.panchromatic import read_as_white
 from isp.processors.catalogue import NAMED
-from isp.settings import WhiteReading
 from rodcone.jit import backend
 from sensor.cfa import RGBW, channels, mask, quad
 
@@ -34,11 +33,9 @@ def frame(picture, tile=RGBW):
     return raw_image(np.rint(behind(picture, tile)) + 100, tile)
 
 
-def read(raw, colour=COLOUR):
+def read(raw):
     """The frame as `isp.interleaved.panchromatic` reads it where all around has one colour."""
-    tiles = [-(-length // size) for length, size in zip(raw.shape, (len(raw.cfa), len(raw.cfa[0])), strict=True)]
-    shares = np.broadcast_to(np.float32(colour / colour[3]), (*tiles, 4)).copy()
-    return WhiteReading(raw, shares, np.zeros(raw.shape, np.float32), np.zeros(tiles, np.float32), shares)
+    return white_reading(raw, COLOUR)
 
 
 def shaded(light):

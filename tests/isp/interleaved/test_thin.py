@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from builders import RGBW_4X4, RGBW_PHASES, behind, mosaic_of, raw_image
+from builders import RGBW_4X4, RGBW_PHASES, behind, mosaic_of, raw_image, white_reading
 
 from isp.interleaved import thin
 from isp.interleaved.thin import follow_samples
 from isp.processors.catalogue import PROCESSORS
-from isp.settings import WhiteReading
 from rodcone.jit import backend
 from sensor.cfa import RGBW
 
@@ -26,9 +25,7 @@ def engine(request, monkeypatch):
 
 def read(raw, shares=None):
     """The frame as `isp.interleaved.panchromatic` reads it, with a window's shares for each tile."""
-    tiles = [-(-length // size) for length, size in zip(raw.shape, (len(raw.cfa), len(raw.cfa[0])), strict=True)]
-    even = np.broadcast_to(np.float32(COLOUR / COLOUR[3]), (*tiles, 4)).copy()
-    return WhiteReading(raw, even, np.zeros(raw.shape), np.zeros(tiles), even if shares is None else shares)
+    return white_reading(raw, COLOUR, shares)
 
 
 def by_hand(raw, planes, noise_gain, shares, row, column):
