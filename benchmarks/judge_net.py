@@ -5,12 +5,12 @@ r"""Judge the network of `isp.processors.corrected` on pictures that it never sa
         --headline out/results/headline/packages        (after `make results PART=headline`)
 
 Pictures are the photographs of docs/white_pixel.md, those of its headline, whose exact R, G and B reach 35 dB by the
-camera's matrix, and those of `training_pictures` (leaves, gratings and patches of other reflectances), by `low_noise`
-behind both mosaics, exposed by `auto:information`, white balance as shot, without diffraction. It writes judged.csv,
-one line a picture, light, mosaic and seed: PSNR [dB] of encoded sRGB against the scene's own colours, and against exact
-R, G and B by the camera's matrix, where colours count for nothing; and the amplitude of a 2x2 pattern on even patches
-[encoded]. summary.csv has gains over `ple` by kind of picture. And it writes sheets of pictures at three times their
-size.
+camera's matrix, leaves of the ColorChecker's measured reflectances, and the pictures of `training_pictures` (leaves,
+gratings and patches of drawn reflectances), by `low_noise` behind both mosaics, exposed by `auto:information`, white
+balance as shot, without diffraction. It writes judged.csv, one line a picture, light, mosaic and seed: PSNR [dB] of
+encoded sRGB against the scene's own colours, and against exact R, G and B by the camera's matrix, where colours count
+for nothing; and the amplitude of a 2x2 pattern on even patches [encoded]. summary.csv has gains over `ple` by kind of
+picture. And it writes sheets of pictures at three times their size.
 """
 
 import argparse
