@@ -6,7 +6,7 @@ r"""Judge the network of `isp.processors.corrected` on pictures that it never sa
 
 Pictures are the photographs of docs/white_pixel.md, those of its headline, whose exact R, G and B reach 35 dB by the
 camera's matrix, leaves of the ColorChecker's measured reflectances, and the pictures of `training_pictures` (leaves,
-gratings and patches of drawn reflectances), by `low_noise` behind both mosaics, exposed by `auto:information`, white
+gratings and patches of drawn reflectances), by `low_noise` behind three mosaics, exposed by `auto:information`, white
 balance as shot, without diffraction. It writes judged.csv, one line a picture, light, mosaic and seed: PSNR [dB] of
 encoded sRGB against the scene's own colours, and against exact R, G and B by the camera's matrix, where colours count
 for nothing; and the amplitude of a 2x2 pattern on even patches [encoded]. summary.csv has gains over `ple` by kind of
@@ -56,7 +56,8 @@ from sensor.response import imaged_electrons
 from studies.metrics.truth import Light, light_in_bands, neutral_electrons, true_srgb
 from studies.photograph.camera import colour_fit
 
-MOSAICS, LEVELS_CD_M2, LONGEST_S = ("rgbw", "bayer"), (0.05, 0.5, 5.0, 100.0), 0.066
+MOSAICS = {"rgbw": "ple_rgbw", "bayer": "ple_bayer", "RG/WB": "ple_rgbw"}  # with the processor that chooses the matrix
+LEVELS_CD_M2, LONGEST_S = (0.05, 0.5, 5.0, 100.0), 0.066
 DRAWN, DRAWN_SEED = 12, 20261129  # two of each kind under D65, A and LED-B3, a seed that nothing is chosen by
 EXACT = "exact"
 PATCHES = 5  # fields a side of a picture of even patches
@@ -144,7 +145,7 @@ def develop(
     device = draw_device(sensor, one.truth.shape[:2], rng)
     raw = expose_channels(per_second_e * exposure_s, sensor, exposure_s, device, rng, exact=True)
     neutral = neutral_electrons(sensor, one.light, exposure_s)
-    colours = colour_fit(sensor, PROCESSORS[f"ple_{mosaic}"], one.light)
+    colours = colour_fit(sensor, PROCESSORS[MOSAICS[mosaic]], one.light)
     balance = WhiteBalance.of(raw, neutral, neutral)
     made = develop_planes(raw, colours, balance, own_prior())
     pictures = {"ple": made.picture, "net": corrected(raw, made, own_weights())}
@@ -236,7 +237,7 @@ def main() -> None:
                 sheet = np.concatenate([found["ple"], found["net"], one.truth], axis=1)
                 sheet = sheet.repeat(ENLARGED, axis=0).repeat(ENLARGED, axis=1)
                 shown = Image.fromarray(np.rint(255 * np.clip(sheet, 0, 1)).astype(np.uint8))
-                shown.save(given.out / f"{one.name.replace(' ', '_')}_{mosaic}_{level:g}.png")
+                shown.save(given.out / f"{one.name.replace(' ', '_')}_{mosaic.replace('/', '')}_{level:g}.png")
     beside_exact = [f"{name}_beside_exact" for name in given_names]
     head = ["kind", "picture", "mosaic", "cd_m2", "seed", *given_names, *beside_exact, "pattern_ple", "pattern_net"]
     gains = summary(rows)

@@ -1,16 +1,17 @@
 r"""Frames to train the network of `isp.processors.corrected` on: pictures that judge nothing, developed by `ple`.
 
-    python benchmarks/net_frames.py out/net --groups 40        (a group: one camera and lamp, both mosaics)
+    python benchmarks/net_frames.py out/net --groups 40          (a group: nine pictures by one camera and lamp)
     python benchmarks/net_frames.py out/net --photographs out/photographs         (of net_photographs.py)
 
 A frame holds what the network sees, and its target: exact R, G and B of the picture by the camera's own matrix, as
 encoded sRGB over the picture's white. So the network isn't taught colours, which a matrix has to choose.
 
-Pictures are drawn, leaves and gratings of drawn reflectances, or photographs: those that `ple`'s prior was trained on,
-and those of a folder. Their colours are changed at random and become surfaces' spectra; those without colour, and one
-in four of the others, get two drawn surfaces at their ends. Read noise is 0.7 to 6 e-,
-pitch 0.8 to 3 um, light 0.02 to 1000 cd/m^2, the lens sharp to soft; lamps are those of `draw_illuminant`. `HELD` is a
-photograph left out to validate on, beside those of a folder that `is_held` names.
+Pictures are drawn of drawn reflectances (leaves, gratings, and fronts: small patches, and lines in the light of another
+lamp), or are photographs: those that `ple`'s prior was trained on, and those of a folder. A photograph's colours are
+changed at random and become surfaces' spectra; those without colour, and one in four of the others, get two drawn
+surfaces at their ends. Read noise is 0.7 to 6 e-, pitch 0.8 to 3 um, light 0.02 to 1000 cd/m^2, the lens sharp to soft;
+lamps are those of `draw_illuminant`. `HELD` is a photograph left out to validate on, beside those of a folder that
+`is_held` names.
 """
 
 import argparse
@@ -35,6 +36,7 @@ from render.radiance_files.surface_spectra import surface_reflectances
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths, photons_per_joule
 from rodcone.colour_spaces import decode_srgb, encode_srgb, white_of
 from rodcone.types import Floats
+from scenes.reflectances import band, edge
 from sensor.capture import expose_channels
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -50,13 +52,15 @@ READ_NOISE_E, PITCH_UM, LUMINANCE_CD_M2 = (0.7, 6.0), (0.8, 3.0), (0.02, 1000.0)
 LONGEST_S = 0.066
 LAMPS = ("D65", "D65", "A", "LED-B3")  # half of the groups, the others' are drawn
 # Of a group's pictures in turn; those of a kind that is drawn are parts of one picture.
-KINDS = ("photograph",) * 6 + ("gratings", "leaves")
+KINDS = ("photograph",) * 6 + ("gratings", "leaves", "fronts")
 DRAWN_SURFACES = 0.25  # share of photographs that lend their brightness alone: other spectra than photographs have
 COARSEST = 8  # side of a pixel of a frame in those of a folder's photograph, at most; its least is 2
 HELD_CD_M2 = (0.05, 0.5, 5.0, 100.0)  # of the groups to validate on, in turn
 NEAR = 2.0  # by which a group's light differs at most, so that it shares `ple`'s tables
-MOSAICS = ("rgbw", "bayer")
-DRAWN = {"leaves": leaf_picture, "gratings": gratings}
+MOSAICS = {"rgbw": "ple_rgbw", "bayer": "ple_bayer", "RG/WB": "ple_rgbw"}  # with the processor that chooses the matrix
+FINE, FRONTS = 3, 220  # points of a pixel's side, and rectangles of a picture
+FRONTS_SIDE = (3.0, 50.0)  # pixels
+LINES_PERIOD = (1.6, 8.0)  # pixels
 LIGHTER = (1.0, 1.0, 1.5)  # factors on the exposure, so that W is full too
 TRUTH_LETTERS = "RGBW"
 
@@ -85,6 +89,39 @@ def draw_camera(rng: np.random.Generator) -> SensorConfig:
         full_well_e=3000.0 * pitch**1.5,
     )
     return replace(sensor, pixel=pixel)
+
+
+def draw_front(rng: np.random.Generator, light: KnownLight, side: tuple[int, int]) -> Floats:
+    """Draw a rectangle (h, w, channel) of a surface, vivid or not, in this lamp's light or another's, often lined."""
+    low, high = rng.uniform(0.02, 0.1), rng.uniform(0.3, 0.8)
+    vivid = (edge(rng.uniform(470, 640), rng.uniform(8, 30), *rng.permutation([low, high])), band(
+        rng.uniform(420, 640), rng.uniform(20, 60), *rng.permutation([low, high])))  # fmt: skip
+    width = band_widths(NM)
+    surface = vivid[rng.integers(2)].band_average(NM, width) if rng.random() < 0.4 else draw_surface(rng)
+    other = np.exp(np.interp(NM, np.linspace(380, 780, 6), rng.normal(0.0, 0.5, 6)))
+    lamp = other / other.max() if rng.random() < 0.4 else np.ones(len(NM))
+    second = surface * rng.uniform(0.15, 0.9) if rng.random() < 0.75 else draw_surface(rng)
+    y, x = np.mgrid[: side[0] * FINE, : side[1] * FINE] / FINE
+    angle = rng.choice((0.0, np.pi / 2, rng.uniform(0, np.pi)))
+    across = np.cos(angle) * y + np.sin(angle) * x + rng.uniform(0, 8)
+    lined = across / rng.uniform(*LINES_PERIOD) % 1 < rng.uniform(0.2, 0.8) * (rng.random() < 0.5)
+    return np.where(lined[..., None], light.signals(second * lamp), light.signals(surface * lamp))
+
+
+def fronts(rng: np.random.Generator, light: KnownLight) -> Floats:
+    """Draw rectangles over one another, (2 CROP, 2 CROP, channel): house fronts, charts of small patches, windows."""
+    length = 2 * CROP * FINE
+    picture = np.tile(light.signals(draw_surface(rng)), (length, length, 1))
+    for _ in range(FRONTS):
+        side = np.exp(rng.uniform(*np.log(FRONTS_SIDE), 2))
+        top, left = (int(rng.integers(length)) for _ in range(2))
+        place = picture[top : top + int(side[0] * FINE), left : left + int(side[1] * FINE)]
+        painted = draw_front(rng, light, (int(np.ceil(side[0])), int(np.ceil(side[1]))))
+        place[:] = painted[: place.shape[0], : place.shape[1]]
+    return picture.reshape(2 * CROP, FINE, 2 * CROP, FINE, -1).mean((1, 3))
+
+
+DRAWN = {"leaves": leaf_picture, "gratings": gratings, "fronts": fronts}
 
 
 def collected(sensor: SensorConfig, lamp: str, nm: Floats) -> Floats:
@@ -154,20 +191,26 @@ def photograph_signals(rng: np.random.Generator, sensor: SensorConfig, lamp: str
 
 
 def take(
-    rng: np.random.Generator, camera: SensorConfig, lamp: str, kind: str, signals: Floats, level_cd_m2: float
+    rng: np.random.Generator,
+    camera: SensorConfig,
+    lamp: str,
+    kind: str,
+    signals: Floats,
+    level_cd_m2: float,
+    mosaics: Sequence[str],
 ) -> list[Frame]:
-    """Photograph a picture by both mosaics at one light."""
+    """Photograph a picture by mosaics at one light."""
     frames, light = [], named_light(lamp)
     factor = float(rng.choice(LIGHTER))
-    for mosaic in MOSAICS:
-        processor = PROCESSORS[f"ple_{mosaic}"]
+    for mosaic in mosaics:
+        processor = PROCESSORS[MOSAICS[mosaic]]
         sensor = vary(camera, mosaic)
         neutral = neutral_electrons(sensor, light, 1.0)
         of_channels = signals[..., [TRUTH_LETTERS.index(name) for name in sensor.channels]]
         green = sensor.channels.index("G")
         per_second_e = of_channels * neutral * (level_cd_m2 / of_channels[..., green].mean())
         exposure_s, sensor = exposed_by_rule(AUTO_INFORMATION, per_second_e, sensor, LONGEST_S)
-        exposure_s = min(exposure_s * (factor if mosaic == "rgbw" else 1.0), LONGEST_S)
+        exposure_s = min(exposure_s * (factor if mosaic != "bayer" else 1.0), LONGEST_S)
         device = draw_device(sensor, (CROP, CROP), rng)
         raw = expose_channels(per_second_e * exposure_s, sensor, exposure_s, device, rng, exact=True)
         colours = colour_fit(sensor, processor, light)
@@ -186,8 +229,13 @@ def take(
     return frames
 
 
-def draw_group(folder: Path, index: int, held: bool, photographs: Sequence[str | Path]) -> None:
-    """Draw a group's frames by one camera and lamp, and write both mosaics' files."""
+def path_of(folder: Path, mosaic: str, index: int, held: bool) -> Path:
+    """Return the file of a group's frames by one mosaic."""
+    return folder / f"{'held' if held else 'train'}_{mosaic.replace('/', '')}_{index:04}.npz"
+
+
+def draw_group(folder: Path, index: int, held: bool, photographs: Sequence[str | Path], mosaics: Sequence[str]) -> None:
+    """Draw a group's frames by one camera and lamp, and write each mosaic's file."""
     rng = np.random.default_rng([64, index, int(held)])
     camera = low_noise() if held else draw_camera(rng)
     lamp = str(rng.choice(LAMPS)) if rng.random() < 0.5 or held else draw_illuminant(rng)
@@ -200,29 +248,30 @@ def draw_group(folder: Path, index: int, held: bool, photographs: Sequence[str |
     for kind, level in zip(KINDS, levels, strict=True):
         source = photographs[int(rng.integers(len(photographs)))] if kind == "photograph" else kind
         signals = draw_signals(rng, camera, lamp, source, drawn)
-        found.append(take(rng, camera, lamp, Path(source).stem, signals, float(level)))
-    for mosaic, frames in zip(MOSAICS, zip(*found, strict=True), strict=True):
+        found.append(take(rng, camera, lamp, Path(source).stem, signals, float(level), mosaics))
+    for mosaic, frames in zip(mosaics, zip(*found, strict=True), strict=True):
         arrays = {name: np.array([getattr(frame, name) for frame in frames]) for name in Frame.__dataclass_fields__}
-        np.savez(folder / f"{'held' if held else 'train'}_{mosaic}_{index:04}.part.npz", **arrays)
-    for mosaic in MOSAICS:  # a file is whole, or isn't there
-        part = folder / f"{'held' if held else 'train'}_{mosaic}_{index:04}.part.npz"
-        part.rename(part.with_name(part.name.replace(".part", "")))
+        path = path_of(folder, mosaic, index, held)
+        part = path.with_suffix(".part.npz")
+        np.savez(part, **arrays)
+        part.rename(path)  # a file is whole, or isn't there
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--groups", type=int, default=100, help="of eight pictures")
+    parser.add_argument("--groups", type=int, default=100, help="of nine pictures")
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--held", type=int, default=0, help="groups to validate on")
+    parser.add_argument("--mosaics", nargs="+", choices=MOSAICS, default=["rgbw", "bayer"])
     parser.add_argument("--photographs", type=Path, help="folder of PNG to draw from beside scikit-image's photographs")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     work = [(index, True) for index in range(given.held)]
     work += [(index, False) for index in range(given.first, given.first + given.groups)]
     for index, held in work:
-        if not (given.folder / f"{'held' if held else 'train'}_bayer_{index:04}.npz").exists():
-            draw_group(given.folder, index, held, photographs_of(given.photographs, held))
+        if not all(path_of(given.folder, mosaic, index, held).exists() for mosaic in given.mosaics):
+            draw_group(given.folder, index, held, photographs_of(given.photographs, held), given.mosaics)
             print(f"group {index}{', held' if held else ''}", flush=True)
 
 

@@ -1,20 +1,20 @@
-r"""Train the network of `isp.processors.corrected` on both mosaics at once (needs torch, for this alone).
+r"""Train the network of `isp.processors.corrected` on its mosaics at once (needs torch, for this alone).
 
     pip install rodcone[train-net]
     python benchmarks/net_frames.py out/net --photographs out/photographs --groups 100 --held 8
     python benchmarks/train_net.py out/net --steps 8000             (--control: the network that sees one pixel)
     python benchmarks/train_net.py out/net --write "Trained on ..."  (network.npz)
 
-Half of each batch is RGBW, half Bayer, of the same pictures. It resumes where it was stopped; ``--steps`` may change
-then. Each line of the log is JSON: steps, processor seconds, and the gain over `ple` [dB of encoded sRGB against the
-frames' targets], of the last crops and of held frames by mosaic.
+Three of each batch's eight crops are RGBW, three Bayer, and two have another tile of R, G, B and W. It resumes where it
+was stopped; ``--steps`` may change then. Each line of the log is JSON: steps, processor seconds, and the gain over
+`ple` [dB of encoded sRGB against the frames' targets], of the last crops and of held frames by mosaic.
 """
 
 import argparse
 import copy
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -28,16 +28,18 @@ from torch.nn import functional
 
 from isp.processors.corrected import INPUTS, LEAK, STEPS, pack, unpack
 
-SEED, BATCH, SIDE, RATE, WARM = 0, 8, 96, 6e-4, 300
+SEED, SIDE, RATE, WARM = 0, 96, 6e-4, 300
 LEAST_MSE, LEAST_STEP_MSE = 1e-5, 1e-5  # 50 dB: beyond it a crop counts no more
 STRUCTURE = 0.5  # weight of the error of differences between neighbours, so that stripes count more than tints
 LUMINANCE = 0.25  # weight of the error of luminance, which an eye sees finest
+PATTERN = 0.1  # weight of the error that repeats with the tile, over WINDOW tiles, so that even surfaces have no grid
+WINDOW, LEAST_PATTERN_MSE = 8, 1e-7
 BT709 = (0.2126, 0.7152, 0.0722)
 WIDTHS = (48, 64, 96)  # features at a half, a quarter and an eighth of the pixels
 ONE_PIXEL = [0, 1, 2, 4, 7]  # of `correction_inputs`: the picture, the noise, the plane of W or green
 HALF = bool(torch.cpu.get_capabilities().get("avx512_bf16", False))
 CARD = "card"
-MOSAICS = ("rgbw", "bayer")
+MOSAICS = {"rgbw": 3, "bayer": 3, "RGWB": 2}  # with the crops of a step
 NAMES = ("network", "control")
 
 
@@ -140,7 +142,10 @@ def crop(rng: np.random.Generator, seen: NDArray[Any], target: NDArray[Any]) -> 
 
 def loss_of(shown: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
     """Return the loss, logarithms of squared errors, and each crop's squared error."""
-    error = functional.pixel_shuffle(shown - target, 2)
+    packed = shown - target
+    repeated = functional.avg_pool2d(packed, WINDOW).unflatten(1, (3, 4))  # of each colour at each site of the tile
+    pattern = repeated.var(dim=2, correction=0).mean((1, 2, 3))
+    error = functional.pixel_shuffle(packed, 2)
     mse = (error**2).mean((1, 2, 3))
     steps = (error.diff(dim=2) ** 2).mean((1, 2, 3)) + (error.diff(dim=3) ** 2).mean((1, 2, 3))
     luminance = ((error * torch.tensor(BT709)[:, None, None]).sum(1) ** 2).mean((1, 2))
@@ -148,6 +153,7 @@ def loss_of(shown: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
         torch.log10(mse + LEAST_MSE)
         + STRUCTURE * torch.log10(steps + LEAST_STEP_MSE)
         + LUMINANCE * torch.log10(luminance + LEAST_MSE)
+        + PATTERN * torch.log10(pattern + LEAST_PATTERN_MSE)
     )
     return logarithms.mean(), mse.detach()
 
@@ -189,14 +195,14 @@ class Run:
         torch.save({**networks, "rng": self.rng.bit_generator.state, "step": self.step, "seconds": self.seconds}, part)
         part.rename(self.path)
 
-    def learn(self, frames: Sequence[Frames], steps: int) -> float:
-        """Make one step, a part of the batch from each set of frames; the mean gain of its crops over `ple` [dB]."""
+    def learn(self, frames: Mapping[str, Frames], steps: int) -> float:
+        """Make one step, a part of the batch from each mosaic's frames; the mean gain of its crops over `ple` [dB]."""
         done = min(self.step / steps, 1.0)
         rate = RATE * (0.01 + 0.99 * (1 + np.cos(np.pi * done)) / 2) * min(1.0, (self.step + 1) / WARM)
         self.optimizer.param_groups[0]["lr"] = rate
         crops = []
-        for one in frames:
-            chosen = self.rng.integers(len(one.seen), size=BATCH // len(frames))
+        for mosaic, one in frames.items():
+            chosen = self.rng.integers(len(one.seen), size=MOSAICS[mosaic])
             crops += [crop(self.rng, one.seen[index], one.targets[index]) for index in chosen]
         packed, target = (torch.from_numpy(np.stack([one[part] for one in crops])) for part in (0, 1))
         before = packed[:, :12]
@@ -220,10 +226,10 @@ class Run:
 def train(folder: Path, steps: int, control: bool, every: int) -> None:
     """Train to so many steps, and log."""
     run = Run(folder / f"{NAMES[control]}.pt", control)
-    frames = [read_frames(folder, "train", mosaic) for mosaic in MOSAICS]
+    frames = {mosaic: read_frames(folder, "train", mosaic) for mosaic in MOSAICS}
     held = {mosaic: read_frames(folder, "held", mosaic) for mosaic in MOSAICS}
     count = sum(value.numel() for value in run.network.parameters())
-    print(f"{NAMES[control]}: {count} weights, {len(frames[0].seen)} frames a mosaic, step {run.step}", flush=True)
+    print(f"{NAMES[control]}: {count} weights, {len(frames['rgbw'].seen)} frames of RGBW, step {run.step}", flush=True)
     gains, start = [], time.process_time() - run.seconds
     while run.step < steps:
         gains.append(run.learn(frames, steps))
@@ -238,7 +244,7 @@ def train(folder: Path, steps: int, control: bool, every: int) -> None:
                 "step": run.step,
                 "seconds": round(run.seconds),
                 "of": steps,
-                "frames": len(frames[0].seen),
+                "frames": {mosaic: len(one.seen) for mosaic, one in frames.items()},
                 "train": round(float(np.mean(gains[-every:])), 3),
                 **{mosaic: round(float(np.mean(found[mosaic])), 3) for mosaic in MOSAICS},
                 "by_frame": by_frame,
@@ -246,7 +252,7 @@ def train(folder: Path, steps: int, control: bool, every: int) -> None:
             with (folder / f"{NAMES[control]}.jsonl").open("a") as log:
                 log.write(json.dumps(line) + "\n")
             print({key: value for key, value in line.items() if key != "by_frame"}, flush=True)
-            frames = [read_frames(folder, "train", mosaic) for mosaic in MOSAICS]  # more may have come
+            frames = {mosaic: read_frames(folder, "train", mosaic) for mosaic in MOSAICS}  # more may have come
             start = time.process_time() - run.seconds  # validation isn't training
 
 
