@@ -26,6 +26,10 @@ OCTAVES = 1.0  # half width of the transition; if narrower, it shows as a step; 
 # where noise makes them those of the surroundings (docs/decisions/0015).
 COLOUR_ERROR = 10.0
 SMOOTH_COLOUR_ERROR = 3.0
+# Squared error of a reconstructed colour apart from noise [(signal of a surface that reflects all light)^2]. It exists
+# because a colour's samples are apart, and surfaces differ from those of the fit
+# (docs/decisions/0069-errors-that-are-no-noise.md).
+PLANE_ERROR = 1e-4
 
 
 def green_snr(raw: RawImage, estimate: NDArray[np.floating]) -> float:
@@ -75,8 +79,9 @@ def substitution_weight(snr: float, threshold: float) -> float:
 def matrix_with_white(fit: ColourFit, noise: NDArray[np.float64], weight: float) -> NDArray[np.float64]:
     """Compute the matrix from balanced R, G, B and W to linear sRGB, with luminance from W in the share `weight`.
 
-    W contributes to the colours by weights that minimise the expected error at the given noise. A fit with a given 3x3
-    matrix (`fit.plain`) leaves W out of the colours, and the luminance is then W itself.
+    W contributes to the colours by weights that minimise the expected error at the given noise. The variance of R, G
+    and B is `SMOOTH_COLOUR_ERROR` times their noise plus `PLANE_ERROR`, so that W has a part even without noise. A fit
+    with a given 3x3 matrix (`fit.plain`) leaves W out of the colours, and the luminance is then W itself.
 
     Parameters
     ----------
@@ -90,7 +95,7 @@ def matrix_with_white(fit: ColourFit, noise: NDArray[np.float64], weight: float)
     (3, 4) float64
         The matrix. Its rows sum to 1, if those of a plain matrix do.
     """
-    colours = fit.matrix("RGBW", noise * SMOOTH_COLOUR_ERROR)
+    colours = fit.matrix("RGBW", noise * SMOOTH_COLOUR_ERROR + [*[PLANE_ERROR] * 3, 0.0])
     noisy = noise * [*[COLOUR_ERROR] * 3, 1.0]
     white = np.eye(4)[3] if fit.plain is not None else luminance_of_srgb(fit.matrix("RGBW", noisy).T)
     return np.asarray(colours + weight * (white - luminance_of_srgb(colours.T)))

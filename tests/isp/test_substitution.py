@@ -84,6 +84,14 @@ def test_with_a_fit_noise_moves_the_picture_to_w_and_a_neutral_stays_one() -> No
     )
 
 
+def test_colours_are_uncertain_even_without_noise() -> None:
+    """So W has a part in the colours, and their differences are amplified less; until decision 0069 neither was so."""
+    fit = ColourFit(tuple("RGBW"), *_moments(np.random.default_rng(1)))
+    exact, used = fit.matrix("RGBW"), matrix_with_white(fit, np.zeros(4), 0.0)
+    assert (used[:, :3] ** 2).sum() < 0.9999 * (exact[:, :3] ** 2).sum()
+    assert used == pytest.approx(exact, abs=0.02)
+
+
 def _moments(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     signals, target = rng.uniform(0, 1, (30, 4)), rng.uniform(0, 1, (30, 3))
     return signals.mean(axis=0), signals.T @ signals / 30, signals.T @ target / 30
