@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from isp.interleaved.kernel.edges import (
     APART,
     CORRELATION,
+    EVEN,
     FAR,
     FEW,
     HIDDEN,
@@ -66,7 +67,9 @@ def sharpen(
     subtracted from E, because otherwise noise would make dark pixels beside bright things. Here m_W counts as at least
     (nu_W N_W)^(1/2). A colour that noise hides is replaced by that of the surroundings,
 
-        F_c -= min(1, 5 / sum_c (<D_c^2> / (nu_c N_c))) (A_c - r_c A_W),    A = P + max(0, 1 - e) (F - P),
+        F_c -= min(1, 5 / (X max(1, X' / 3.5))) (A_c - r_c A_W),    X = sum_c <D_c^2> / (nu_c N_c),
+
+        X' = sum_c <D_c^2>' / (nu_c N_c),    A = P + max(0, 1 - e) (F - P),
 
     where 1 / nu_c is the frame's mean of 1 / noise gain, <> the mean over the window, and D_c = P_c - r_c P_W. r_c is
     the ratio of channel c to W (at least (nu_W N_W)^(1/2)) in a weighted mean of the planes at 5 x 5 places that are 12
@@ -179,7 +182,10 @@ def _sharpen(
     tint = np.maximum(around, 0.0) / np.maximum(around[..., 3], faint)[..., None]
     tint[..., 3] = 1.0
     apart = variance + tint * (tint * variance[..., 3:] - 2.0 * covariance[..., 3]) + (mean - tint * mean[..., 3:]) ** 2
-    hidden = HIDDEN / np.maximum((apart / (nu * noise)).sum(axis=2, keepdims=True), HIDDEN)
+    differences = (alike[..., None] * (beside - tint[:, :, None, None] * beside[..., 3:]) ** 2).sum(axis=(2, 3))
+    differences /= np.maximum(alike.sum(axis=(2, 3)), TINY)[..., None]
+    coloured = np.maximum((differences / (nu * noise)).sum(axis=2, keepdims=True) / EVEN, 1.0)
+    hidden = HIDDEN / np.maximum(coloured * (apart / (nu * noise)).sum(axis=2, keepdims=True), HIDDEN)
     shading = contrast[..., None] * light[..., :, None] * light[..., None, :]
     covariance = SPREAD[0] * covariance + SPREAD[1] * shading
 

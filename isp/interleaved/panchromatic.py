@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from isp.anscombe import stabilise_channel
 from isp.interleaved.kernel.edges import TINY, channel_noise
 from isp.interleaved.kernel.panchromatic import (
+    BELOW,
     DETAIL_PX,
     FAINT,
     LEAST_LIGHT,
@@ -80,7 +81,12 @@ def read_as_white(raw: RawImage, neutral: Floats) -> WhiteReading:
 
         g = t + (D + T) / (D + T + N) (v - t),    D = max(0, <(v - t)^2 / (N + T)> - 1) / <1 / (N + T)>,
 
-    where D is the variance of detail that t misses, and <> the mean over 5 x 5 pixels.
+    where D is the variance of detail that t misses, and <> the mean over 5 x 5 pixels. Beside a lamp D is large, so that
+    g would be v with all its noise, and the dark pixels there would be compared with those alone whose noise is as
+    negative as their own (docs/decisions/0060-clouds-and-dark-rims.md). Therefore, if g is below the least t of the
+    3 x 3 pixels around, b, this counts as far as it isn't noise, where N is that of the light b:
+
+        g' = b - max(0, 1 - 4 N / (b - g)^2) (b - g).
 
     Parameters
     ----------
@@ -202,7 +208,11 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
     inverse = 1.0 / (own_variance + around_variance)
     detail = np.maximum(_box(difference**2 * inverse, DETAIL_PX) - 1.0, 0.0) / _box(inverse, DETAIL_PX)
     trusted = detail + around_variance
-    return surroundings, around + trusted / (trusted + own_variance) * difference, lines, shares
+    guide = around + trusted / (trusted + own_variance) * difference
+    least = scipy.ndimage.minimum_filter(around, 3, mode="mirror")
+    below = np.maximum(least - guide, 0.0)
+    seen = np.maximum(1.0 - BELOW * noise(least) / np.maximum(below**2, TINY), 0.0)
+    return surroundings, np.maximum(guide, least) - seen * below, lines, shares
 
 
 def _without_lines(means: Floats, error: Floats, around: Floats, light: Floats, raw: RawImage) -> tuple[Floats, Floats]:

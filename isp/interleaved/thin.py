@@ -1,4 +1,4 @@
-"""Light of which a channel has no sample, such as that of a bar that is one pixel wide.
+"""Planes that average few samples: light of which a channel has none, and noise that stands for a colour.
 
 A bar on a column of R and B is on no site of G and W. Their planes are means of the samples that resemble the bar most,
 and those are as dark as what lies around, so that a grey bar becomes pink (docs/decisions/0066-bars-of-a-pixel.md).
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.interleaved.kernel.edges import APART, TINY, channel_noise
-from isp.interleaved.kernel.thin import CONTRAST, follow_frame
+from isp.interleaved.kernel.thin import CONTRAST, DIM, MANY, follow_frame
 from isp.interleaved.panchromatic import at_pixels
 from isp.settings import WhiteReading
 from rodcone.jit import backend
@@ -30,8 +30,14 @@ def follow_samples(
 
         P'_c = P_c + G_c max(0, 1 - 9 N_c / d_c^2) min(1, max(0, |d_c| / max(v, w_c) - 0.4) / 0.3) u_c d_c.
 
-    The last factor keeps colours that change within the window of u. Where the sample or a plane is full, there may be
-    more light than was read, and planes stay.
+    The last factor keeps colours that change within the window of u. In the dark, planes are noise beside W's. Let
+    a_c = P'_c - u_c P'_W be the colour by which they differ from the window, V_c = G_c M_c + u_c^2 G_W M_W its variance,
+    and M_c = k_c L_c + s_c^2 that of a sample, where L_c = max(0, u_c P'_W). Colour counts as far as it isn't noise:
+
+        P''_c = P'_c - max(0, 1 - L_c^2 / (30 M_c)) min(1, 20 G_c) min(1, 9 V_c / a_c^2) a_c.
+
+    The first factor is 0 in good light, where a single sample shows a colour. Where the sample or a plane is full,
+    there may be more light than was read, and planes stay.
 
     Parameters
     ----------
@@ -43,7 +49,7 @@ def follow_samples(
     Returns
     -------
     (h, w, 4) float32
-        P' [e-].
+        P'' [e-].
     """
     raw = white.raw
     if backend() != "numpy":
@@ -63,5 +69,14 @@ def follow_samples(
     contrast = np.abs(difference) / np.maximum(np.maximum(value, of_planes), TINY)
     clear = np.clip((contrast - CONTRAST[0]) / np.ptp(CONTRAST), 0.0, 1.0)
     moved = planes + noise_gain * seen * clear * shares * difference
+
+    # A colour that noise hides becomes that of the window.
+    expected = shares * moved[..., 3:]
+    light, away = np.maximum(expected, 0.0), moved - expected
+    of_sample = shot * light + dark
+    of_colour = noise_gain * of_sample + shares**2 * (noise_gain * of_sample)[..., 3:]
+    dim = np.maximum(1.0 - light**2 / np.maximum(DIM * of_sample, TINY), 0.0)
+    hidden = np.minimum(APART * of_colour / np.maximum(away**2, TINY), 1.0)
+    moved = moved - dim * np.minimum(MANY * noise_gain, 1.0) * hidden * away
     is_full = (sample >= full_e[site]) | (planes >= full_e).any(axis=2, keepdims=True)
     return np.where(is_full, planes, moved).astype(np.float32)

@@ -29,6 +29,9 @@ FAR = 24  # distance [pixels] to either side within which the surroundings' colo
 STEP = 12  # distance [pixels] between the 5 x 5 places at which it is found
 # chi^2 of a colour up to which noise hides it. With 3, coloured clouds remain in the dark; with 9, charts get paler.
 HIDDEN = 5.0
+# Mean chi^2 of the colours of like places that noise alone makes, by three channels, W, and the mean itself. Where
+# places differ more, as in a chart, less is hidden.
+EVEN = 3.5
 APART = 9.0  # squared standard deviations of noise by which a sample has to differ from W's plane to count by itself
 # Contrast from which on a light is small. With 1, edges of windows show the tile; with 2, halos of lamps have 15 % more
 # false hues.
@@ -95,9 +98,10 @@ def sharpen_frame(
     variance = jit.Array4f([larger(covariance[c][c], 0.0) for c in range(4)])
     contrast = dr.sum(variance / noise) / (1.0 + dr.sum(dr.square(light) / noise))
     faint = dr.sqrt(nu[3] * noise[3])
-    tint = _tint_of_like_places(mean, far, shot, dark, faint)
+    tint, differences = _colour_of_like_places(mean, far, shot, dark, faint)
     apart = variance + tint * (tint * variance[3] - 2.0 * covariance[3]) + dr.square(mean - tint * mean[3])
-    hidden = HIDDEN / larger(dr.sum(apart / (nu * noise)), HIDDEN)
+    coloured = larger(dr.sum(differences / (nu * noise)) / EVEN, 1.0)
+    hidden = HIDDEN / larger(coloured * dr.sum(apart / (nu * noise)), HIDDEN)
     covariance = [SPREAD[0] * covariance[c] + SPREAD[1] * contrast * light[c] * light for c in range(4)]
 
     # The best linear estimate.
@@ -166,8 +170,13 @@ def _moments(window: list[Packet]) -> tuple[Packet, list[Packet]]:
     return middle + offset, [arrays().Array4f([products[min(c, d), max(c, d)] for d in range(4)]) for c in range(4)]
 
 
-def _tint_of_like_places(mean: Packet, far: list[Packet], shot: Packet, dark: Packet, faint: Float) -> Packet:
-    """Compute r, the colour of those places `far` whose light resembles a window's; `faint` is the noise of W."""
+def _colour_of_like_places(
+    mean: Packet, far: list[Packet], shot: Packet, dark: Packet, faint: Float
+) -> tuple[Packet, Packet]:
+    """Compute r, the colour of those places `far` whose light resembles a window's, and D'^2, how far they differ.
+
+    `faint` is the noise of W.
+    """
 
     def in_noise(values: Packet) -> Packet:
         return 2.0 / shot * dr.sqrt(shot * larger(values, 0.0) + dark)
@@ -175,9 +184,11 @@ def _tint_of_like_places(mean: Packet, far: list[Packet], shot: Packet, dark: Pa
     own = in_noise(mean)
     alike = [dr.exp(-0.5 * dr.sum(dr.square(in_noise(values) - own))) for values in far]
     first, *others = [w * values for w, values in zip(alike, far, strict=True)]
-    around = sum(others, first)
-    tint = larger(around, 0.0) / larger(around[3], larger(sum(alike, 0.0) * faint, TINY))
-    return arrays().Array4f(tint[0], tint[1], tint[2], 1.0)
+    around, count = sum(others, first), sum(alike, 0.0)
+    tint = larger(around, 0.0) / larger(around[3], larger(count * faint, TINY))
+    tint = arrays().Array4f(tint[0], tint[1], tint[2], 1.0)
+    first, *others = [w * dr.square(values - tint * values[3]) for w, values in zip(alike, far, strict=True)]
+    return tint, sum(others, first) / larger(count, TINY)
 
 
 def _lamp(white: list[Float], light: Float, contrast: Float, chi_squared: Float) -> Float:

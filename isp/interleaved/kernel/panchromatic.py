@@ -5,6 +5,7 @@ One thread per tile computes shares, which change more slowly than light; one th
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,9 @@ LINE_ERRORS = 5.0  # standard errors of the means, by noise alone, that lines ha
 # Squares of the other two patterns, over that of lines, at which lines no longer count. A surface in sodium light among
 # grey ones shows 0.33. At most 1, so that only upright or only lying lines count.
 OTHER_PATTERNS = 0.3
+# Squared standard deviations of a sample that count as noise below the means around it. With 9, dark lines two pixels
+# apart in good light get half as bright again.
+BELOW = 4.0
 BAND_PIXELS = 2_000_000  # pixels that are processed together, with 60 bytes each
 
 Numbers = list[Float]  # Dr.Jit arrays, such as one per channel
@@ -233,9 +237,16 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     steps = range(-(DETAIL_PX // 2), DETAIL_PX // 2 + 1)
     lines = pixels.store(*_sums(pixels.load(spread, pixels.around([0], steps), 2)))
     squares, inverse = _sums(pixels.load(lines, pixels.around(steps, [0]), 2))
-    mean, difference, mean_variance, own_variance = pixels.load(parts, pixels.around([0], [0]), 4)[0]
+    nine = pixels.load(parts, pixels.around(near, near), 4)
+    mean, difference, mean_variance, own_variance = nine[4]
     trusted = larger(squares - float(DETAIL_PX**2), 0.0) / inverse + mean_variance
     guide = mean + trusted / (trusted + own_variance) * difference
+
+    # What lies below all means around counts as far as it isn't noise.
+    least = reduce(dr.minimum, [values[0] for values in nine])
+    below = larger(least - guide, 0.0)
+    seen = larger(1.0 - BELOW * variance(least) / larger(dr.square(below), TINY), 0.0)
+    guide = larger(guide, least) - seen * below
     dr.eval(guide)
     by_tile = -(-height // down), -(-width // across)
     surroundings, of_windows = (values.numpy().reshape(*by_tile, -1) for values in (around, shares))

@@ -99,6 +99,27 @@ def test_detail_that_the_eight_around_miss_stays():
     assert guide == pytest.approx(expected, rel=0.3)
 
 
+def test_pixels_beside_a_window_in_the_dark_resemble_the_wall():
+    """Of 14 e- of W, colour samples beside light of 1900 say nothing; 18 % were read as under a quarter of the wall."""
+    light = np.full((64, 64), 3.0)
+    ring = np.zeros(light.shape, bool)
+    for row, column in product((14, 42), (15, 44)):
+        light[row : row + 8, column : column + 5] = 400.0
+        ring[row - 2 : row + 10, column - 2 : column + 7] = True
+    beside = [guide_e(exposed(light, seed=seed))[ring & (light < 400.0)] for seed in range(4)]
+    assert (np.concatenate(beside) < 0.25 * 3.0 * NEUTRAL["W"]).mean() < 0.08
+
+
+def test_a_dark_pixel_in_good_light_stays():
+    """A pixel of a tenth of the light around it is known by its own sample, whatever its channel."""
+    light = np.full((48, 48), 2000.0)
+    dots = np.zeros(light.shape, bool)
+    dots[np.ix_([9, 20, 31], [10, 21, 34])] = True
+    light[dots] = 200.0
+    for tile in RGBW_PHASES:
+        assert (guide_e(exposed(light, tile=tile, seed=5))[dots] < 0.25 * 2000.0 * NEUTRAL["W"]).all(), tile
+
+
 def lines_on_grey(axis, tile, seed=None) -> tuple[RawImage, np.ndarray]:
     """Grey lines two pixels apart, 75 to 525 e- in G, on 10 x 10 pixels of an even grey of 300, and their light."""
     light = np.full((64, 64), 300.0)

@@ -39,7 +39,12 @@ def by_hand(raw, planes, noise_gain, shares, row, column):
     noise = (max(sample / u[o], plane[3], 0.0) + dark / u[o]) / u[o] + gain * (np.maximum(plane, 0.0) + dark) / u**2
     difference = sample / u[o] - plane / u
     clear = np.clip((np.abs(difference) / np.maximum(sample / u[o], plane / u) - 0.4) / 0.3, 0.0, 1.0)
-    return plane + gain * np.maximum(0.0, 1.0 - 9.0 * noise / difference**2) * clear * u * difference
+    moved = plane + gain * np.maximum(0.0, 1.0 - 9.0 * noise / difference**2) * clear * u * difference
+    light, away = u * max(moved[3], 0.0), moved - u * moved[3]
+    variance = gain * (light + dark)
+    hidden = np.minimum(1.0, 9.0 * (variance + u**2 * variance[3]) / np.maximum(away**2, 1e-9))
+    dim = np.maximum(0.0, 1.0 - light**2 / (light + dark) / 30.0)
+    return moved - dim * np.minimum(1.0, 20.0 * gain) * hidden * away
 
 
 @pytest.mark.parametrize("tile", [*RGBW_PHASES, RGBW_4X4])
