@@ -74,7 +74,8 @@ def sharpen(
     where 1 / nu_c is the frame's mean of 1 / noise gain, <> the mean over the window, and D_c = P_c - r_c P_W. r_c is
     the ratio of channel c to W (at least (nu_W N_W)^(1/2)) in a weighted mean of the planes at 5 x 5 places that are 12
     pixels apart. The more a place resembles m, the larger is its weight; where it differs by one sample's noise in one
-    channel, the weight is exp(-1/2). A lamp therefore hardly counts.
+    channel, the weight is exp(-1/2). A lamp therefore hardly counts. <>' is the mean of the places by these weights. On
+    an even surface X' is about 3.5 by noise alone; where like places differ in colour, less is hidden.
 
     In three cases the colour of light isn't known:
 

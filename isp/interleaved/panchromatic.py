@@ -81,10 +81,10 @@ def read_as_white(raw: RawImage, neutral: Floats) -> WhiteReading:
 
         g = t + (D + T) / (D + T + N) (v - t),    D = max(0, <(v - t)^2 / (N + T)> - 1) / <1 / (N + T)>,
 
-    where D is the variance of detail that t misses, and <> the mean over 5 x 5 pixels. Beside a lamp D is large, so that
-    g would be v with all its noise, and the dark pixels there would be compared with those alone whose noise is as
-    negative as their own (docs/decisions/0060-clouds-and-dark-rims.md). Therefore, if g is below the least t of the
-    3 x 3 pixels around, b, this counts as far as it isn't noise, where N is that of the light b:
+    where D is the variance of detail that t misses, and <> the mean over 5 x 5 pixels. Beside a lamp D is large, so
+    that g would be v with all its noise. The dark pixels there would then be compared only with those whose noise is as
+    negative as their own (docs/decisions/0070-noise-beside-lamps.md). Therefore, if g is below the least t of the 3 x 3
+    pixels around, b, this counts as far as it isn't noise, where N is that of the light b:
 
         g' = b - max(0, 1 - 4 N / (b - g)^2) (b - g).
 

@@ -30,9 +30,10 @@ def follow_samples(
 
         P'_c = P_c + G_c max(0, 1 - 9 N_c / d_c^2) min(1, max(0, |d_c| / max(v, w_c) - 0.4) / 0.3) u_c d_c.
 
-    The last factor keeps colours that change within the window of u. In the dark, planes are noise beside W's. Let
-    a_c = P'_c - u_c P'_W be the colour by which they differ from the window, V_c = G_c M_c + u_c^2 G_W M_W its variance,
-    and M_c = k_c L_c + s_c^2 that of a sample, where L_c = max(0, u_c P'_W). Colour counts as far as it isn't noise:
+    The last factor keeps colours that change within the window of u. In the dark, planes of few samples have the colour
+    of their noise. Let a_c = P'_c - u_c P'_W be their difference from the window's colour, L_c = max(0, u_c P'_W),
+    M_c = k_c L_c + s_c^2 the variance of a sample, and V_c = G_c M_c + u_c^2 G_W M_W that of a_c. If noise explains the
+    difference, the window's colour takes its place (docs/decisions/0070-noise-beside-lamps.md):
 
         P''_c = P'_c - max(0, 1 - L_c^2 / (30 M_c)) min(1, 20 G_c) min(1, 9 V_c / a_c^2) a_c.
 

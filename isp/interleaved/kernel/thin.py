@@ -14,8 +14,8 @@ from rodcone.jit import arrays, dr
 # Difference between sample and plane, over the larger of the two, from which on the plane begins to follow, and follows
 # fully. From 0.3 to 0.6, photographs lose 0.03 dB; bars in drawn house fronts gain 0.1 dB.
 CONTRAST = 0.4, 0.7
-# Squared ratio of light to a sample's noise from which on a colour isn't taken for noise. Without it, photographs by day
-# lose 0.1 dB.
+# Squared ratio of light to a sample's noise from which on a colour isn't taken for noise. Without it, six pictures by
+# day lose 0.1 dB.
 DIM = 30.0
 MANY = 20.0  # a plane that averages more samples than this keeps a part of its own colour in the dark
 
