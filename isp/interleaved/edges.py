@@ -67,7 +67,7 @@ def sharpen(
     subtracted from E, because otherwise noise would make dark pixels beside bright things. Here m_W counts as at least
     (nu_W N_W)^(1/2). A colour that noise hides is replaced by that of the surroundings,
 
-        F_c -= min(1, 5 / (X max(1, X' / 3.5))) (A_c - r_c A_W),    X = sum_c <D_c^2> / (nu_c N_c),
+        F_c -= min(1, 7 / (X max(1, X' / 3.5))) (A_c - r_c A_W),    X = sum_c <D_c^2> / (nu_c N_c),
 
         X' = sum_c <D_c^2>' / (nu_c N_c),    A = P + max(0, 1 - e) (F - P),
 

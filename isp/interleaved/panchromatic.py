@@ -15,7 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from isp.anscombe import stabilise_channel
-from isp.interleaved.kernel.edges import TINY, channel_noise
+from isp.interleaved.kernel.edges import DIM, TINY, channel_noise
 from isp.interleaved.kernel.panchromatic import (
     BELOW,
     DETAIL_PX,
@@ -86,7 +86,9 @@ def read_as_white(raw: RawImage, neutral: Floats) -> WhiteReading:
     negative as their own (docs/decisions/0070-noise-beside-lamps.md). Therefore, if g is below the least t of the 3 x 3
     pixels around, b, this counts as far as it isn't noise, where N is that of the light b:
 
-        g' = b - max(0, 1 - 4 N / (b - g)^2) (b - g).
+        g' = g + max(0, 1 - b^2 / (30 N)) min(1, 4 N / (b - g)^2) (b - g).
+
+    The first factor is 0 in good light, where a dark pixel is known by a single sample.
 
     Parameters
     ----------
@@ -211,8 +213,9 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
     guide = around + trusted / (trusted + own_variance) * difference
     least = scipy.ndimage.minimum_filter(around, 3, mode="mirror")
     below = np.maximum(least - guide, 0.0)
-    seen = np.maximum(1.0 - BELOW * noise(least) / np.maximum(below**2, TINY), 0.0)
-    return surroundings, np.maximum(guide, least) - seen * below, lines, shares
+    dim = np.maximum(1.0 - np.maximum(least, 0.0) ** 2 / (DIM * noise(least)), 0.0)
+    hidden = np.minimum(BELOW * noise(least) / np.maximum(below**2, TINY), 1.0)
+    return surroundings, guide + dim * hidden * below, lines, shares
 
 
 def _without_lines(means: Floats, error: Floats, around: Floats, light: Floats, raw: RawImage) -> tuple[Floats, Floats]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from isp.anscombe import stabilise_channel
 from isp.interleaved.kernel.accumulate import larger
-from isp.interleaved.kernel.edges import TINY, at_site, channel_noise
+from isp.interleaved.kernel.edges import DIM, TINY, at_site, channel_noise
 from isp.interleaved.kernel.layout import packet_width
 from isp.planes import tent
 from rodcone.device_arrays import divide, divisor, upload
@@ -242,11 +242,11 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     trusted = larger(squares - float(DETAIL_PX**2), 0.0) / inverse + mean_variance
     guide = mean + trusted / (trusted + own_variance) * difference
 
-    # What lies below all means around counts as far as it isn't noise.
+    # In the dark, what lies below all means around counts as far as it isn't noise.
     least = reduce(dr.minimum, [values[0] for values in nine])
-    below = larger(least - guide, 0.0)
-    seen = larger(1.0 - BELOW * variance(least) / larger(dr.square(below), TINY), 0.0)
-    guide = larger(guide, least) - seen * below
+    below, least_variance = larger(least - guide, 0.0), variance(least)
+    dim = larger(1.0 - dr.square(larger(least, 0.0)) / (DIM * least_variance), 0.0)
+    guide += dim * dr.minimum(BELOW * least_variance / larger(dr.square(below), TINY), 1.0) * below
     dr.eval(guide)
     by_tile = -(-height // down), -(-width // across)
     surroundings, of_windows = (values.numpy().reshape(*by_tile, -1) for values in (around, shares))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.interleaved.kernel.accumulate import larger
-from isp.interleaved.kernel.edges import APART, TINY, at_site, channel_noise
+from isp.interleaved.kernel.edges import APART, DIM, TINY, at_site, channel_noise
 from isp.settings import WhiteReading
 from rodcone.device_arrays import divide, divisor, upload
 from rodcone.jit import arrays, dr
@@ -14,10 +14,9 @@ from rodcone.jit import arrays, dr
 # Difference between sample and plane, over the larger of the two, from which on the plane begins to follow, and follows
 # fully. From 0.3 to 0.6, photographs lose 0.03 dB; bars in drawn house fronts gain 0.1 dB.
 CONTRAST = 0.4, 0.7
-# Squared ratio of light to a sample's noise from which on a colour isn't taken for noise. Without it, six pictures by
-# day lose 0.1 dB.
-DIM = 30.0
-MANY = 20.0  # a plane that averages more samples than this keeps a part of its own colour in the dark
+# Noise gains from which on a plane's colour may be taken for noise, and fully. From 0 to 0.05, even surfaces have fewer
+# clouds, and things are paler.
+NOISY = 0.02, 0.1
 
 
 def follow_frame(white: WhiteReading, planes: NDArray[Any], noise_gain: NDArray[Any]) -> NDArray[np.float32]:
@@ -63,7 +62,8 @@ def follow_frame(white: WhiteReading, planes: NDArray[Any], noise_gain: NDArray[
     of_colour = of_planes_noise + dr.square(shares) * of_planes_noise[3]
     dim = larger(1.0 - dr.square(light) / larger(DIM * of_sample, TINY), 0.0)
     hidden = dr.minimum(APART * of_colour / larger(dr.square(away), TINY), 1.0)
-    moved -= dim * dr.minimum(MANY * gain, 1.0) * hidden * away
+    noisy = dr.minimum(larger((gain - NOISY[0]) / (NOISY[1] - NOISY[0]), 0.0), 1.0)
+    moved -= dim * noisy * hidden * away
     is_full = (sample >= at_site([*full_e], site)) | dr.any(plane >= full_e)
     result = dr.empty(jit.Float, planes.size)
     dr.scatter(result, dr.select(is_full, plane, moved), pixel, mode=dr.ReduceMode.NoConflicts)

@@ -77,7 +77,7 @@ def by_hand(raw, planes, gains, noise_gain, row, column):
     even = planes[row, column] + max(0.0, 1.0 - contrast) * (sharp - planes[row, column])
     beside = alike @ (around - tint * around[:, 3:]) ** 2 / max(alike.sum(), 1e-9)
     coloured = max(1.0, (beside / noise_gain / noise).sum() / 3.5)
-    sharp -= min(1.0, 5.0 / coloured / (distances / noise_gain / noise).sum()) * (even - tint * even[3])
+    sharp -= min(1.0, 7.0 / coloured / (distances / noise_gain / noise).sum()) * (even - tint * even[3])
     full = [any(o == c and a not in kept for a, o in enumerate(own)) for c in range(4)]
     white = window[:, 3].reshape(5, 5)
     between = white[1:4, 1:4].mean() - 1.5 * min(white[i::2, j::2].mean() for i, j in product((0, 1), repeat=2))
