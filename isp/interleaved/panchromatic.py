@@ -15,10 +15,11 @@ import scipy
 from numpy.typing import NDArray
 
 from isp.anscombe import stabilise_channel
-from isp.interleaved.kernel.edges import DIM, TINY, channel_noise
+from isp.interleaved.kernel.edges import TINY, channel_noise
 from isp.interleaved.kernel.panchromatic import (
     BELOW,
     DETAIL_PX,
+    DIM,
     FAINT,
     LEAST_LIGHT,
     LEAST_SHARE,
@@ -86,7 +87,7 @@ def read_as_white(raw: RawImage, neutral: Floats) -> WhiteReading:
     negative as their own (docs/decisions/0070-noise-beside-lamps.md). Therefore, if g is below the least t of the 3 x 3
     pixels around, b, this counts as far as it isn't noise, where N is that of the light b:
 
-        g' = g + max(0, 1 - b^2 / (30 N)) min(1, 4 N / (b - g)^2) (b - g).
+        g' = g + max(0, 1 - b^2 / (3 N)) min(1, 4 N / (b - g)^2) (b - g).
 
     The first factor is 0 in good light, where a dark pixel is known by a single sample.
 

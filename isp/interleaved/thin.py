@@ -7,8 +7,8 @@ and those are as dark as what lies around, so that a grey bar becomes pink (docs
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.interleaved.kernel.edges import APART, DIM, TINY, channel_noise
-from isp.interleaved.kernel.thin import CONTRAST, NOISY, follow_frame
+from isp.interleaved.kernel.edges import APART, TINY, channel_noise
+from isp.interleaved.kernel.thin import CONTRAST, DIM, NOISY, follow_frame
 from isp.interleaved.panchromatic import at_pixels
 from isp.settings import WhiteReading
 from rodcone.jit import backend
@@ -35,7 +35,7 @@ def follow_samples(
     M_c = k_c L_c + s_c^2 the variance of a sample, and V_c = G_c M_c + u_c^2 G_W M_W that of a_c. If noise explains the
     difference, the window's colour takes its place (docs/decisions/0070-noise-beside-lamps.md):
 
-        P''_c = P'_c - max(0, 1 - L_c^2 / (30 M_c)) q_c min(1, 9 V_c / a_c^2) a_c.
+        P''_c = P'_c - max(0, 1 - L_c^2 / (10 M_c)) q_c min(1, 9 V_c / a_c^2) a_c.
 
     The first factor is 0 in good light, where a single sample shows a colour. q_c rises from 0 to 1 where G_c rises
     from 0.02 to 0.1, because a plane that averages more than 50 samples has little noise. Where the sample or a plane

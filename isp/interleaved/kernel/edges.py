@@ -33,9 +33,6 @@ HIDDEN = 7.0
 # places differ more, as in a chart, less is hidden.
 EVEN = 3.5
 APART = 9.0  # squared standard deviations of noise by which a sample has to differ from W's plane to count by itself
-# Squared ratio of light to a sample's noise from which on a difference isn't taken for noise. Without it, six pictures
-# by day lose 0.1 dB.
-DIM = 30.0
 # Contrast from which on a light is small. With 1, edges of windows show the tile; with 2, halos of lamps have 15 % more
 # false hues.
 SMALL = 1.5

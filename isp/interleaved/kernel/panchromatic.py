@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from isp.anscombe import stabilise_channel
 from isp.interleaved.kernel.accumulate import larger
-from isp.interleaved.kernel.edges import DIM, TINY, at_site, channel_noise
+from isp.interleaved.kernel.edges import TINY, at_site, channel_noise
 from isp.interleaved.kernel.layout import packet_width
 from isp.planes import tent
 from rodcone.device_arrays import divide, divisor, upload
@@ -37,6 +37,9 @@ OTHER_PATTERNS = 0.3
 # Squared standard deviations of a sample that count as noise below the means around it. With 9, dark lines two pixels
 # apart in good light get half as bright again.
 BELOW = 4.0
+# Squared ratio of light to a sample's noise from which on such a sample isn't taken for noise. With 30, a star at 0.5
+# cd/m^2 loses 0.5 dB.
+DIM = 3.0
 BAND_PIXELS = 2_000_000  # pixels that are processed together, with 60 bytes each
 
 Numbers = list[Float]  # Dr.Jit arrays, such as one per channel

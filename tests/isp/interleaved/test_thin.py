@@ -43,7 +43,7 @@ def by_hand(raw, planes, noise_gain, shares, row, column):
     light, away = u * max(moved[3], 0.0), moved - u * moved[3]
     variance = gain * (light + dark)
     hidden = np.minimum(1.0, 9.0 * (variance + u**2 * variance[3]) / np.maximum(away**2, 1e-9))
-    dim = np.maximum(0.0, 1.0 - light**2 / (light + dark) / 30.0)
+    dim = np.maximum(0.0, 1.0 - light**2 / (light + dark) / 10.0)
     return moved - dim * np.clip((gain - 0.02) / 0.08, 0.0, 1.0) * hidden * away
 
 
