@@ -93,9 +93,8 @@ def sharpen_frame(
 
     # What the window holds: m, C, N, e (contrast), r (tint), <D^2> (apart), and the share that noise hides.
     mean, covariance = _moments(window)
-    light = larger(mean, 0.0)
-    noise = larger(shot * larger(mean, 0.0) + dark, TINY)
-    variance = jit.Array4f([larger(covariance[c][c], 0.0) for c in range(4)])
+    light, variance = larger(mean, 0.0), jit.Array4f([larger(covariance[c][c], 0.0) for c in range(4)])
+    noise = larger(shot * light + dark, TINY)
     contrast = dr.sum(variance / noise) / (1.0 + dr.sum(dr.square(light) / noise))
     faint = dr.sqrt(nu[3] * noise[3])
     tint, differences = _colour_of_like_places(mean, far, shot, dark, faint)
