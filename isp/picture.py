@@ -10,7 +10,7 @@ from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.encoding import encode
 from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import BalanceSource, WhiteBalance
-from isp.substitution import COLOUR_ERROR
+from isp.substitution import COLOUR_ERROR, PLANE_ERROR
 from rodcone.colour_spaces import white_of
 from rodcone.display import Axes, brief, draw_line, preview_png
 from rodcone.doors import method
@@ -122,7 +122,7 @@ def finish(
         Engine that made the planes.
     noise_gain : (h, w, 3) array, optional
         Noise gain as `isp.interleaved.reconstruction.reconstruct_with_noise` returns it. If `matrix` is a `ColourFit`,
-        the colours take this noise into account.
+        the colours take this noise into account, and `isp.substitution.PLANE_ERROR` beside it.
     """
     shape = *raw.shape, len(raw.channels)
     if planes.shape != shape or (noise_gain is not None and np.shape(noise_gain) != shape):
@@ -131,11 +131,11 @@ def finish(
         )
     colours = ColourFit.of(matrix)
     gains, sources = WhiteBalance.of(raw, neutral, balance).gains(raw, planes)
-    noise = np.zeros(3)
+    error = np.zeros(3)
     if noise_gain is not None:
-        noise = relative_noise(raw, planes, noise_gain, gains, colours)
+        error = COLOUR_ERROR * relative_noise(raw, planes, noise_gain, gains, colours) + PLANE_ERROR
     balanced = clip_highlights(raw, planes * gains, gains)
-    return Picture(balanced @ colours.matrix(noise=noise * COLOUR_ERROR).T, sources, engine)
+    return Picture(balanced @ colours.matrix(noise=error).T, sources, engine)
 
 
 def require_letters(raw: RawImage, names: tuple[str, ...]) -> tuple[str, ...]:

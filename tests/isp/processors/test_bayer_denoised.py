@@ -10,6 +10,7 @@ from builders import BAYER_PHASES, RGBW_4X4, RGBW_PHASES, behind, mosaic_of, raw
 from refusal import refusal
 from skimage import data
 
+from isp.colour.colour_fit import ColourFit
 from isp.interleaved.reconstruction import reconstruct
 from isp.processors import sub_images
 from isp.processors.bayer_denoised import NOISE_AFTER_DEMOSAICKING
@@ -17,6 +18,7 @@ from isp.processors.catalogue import PROCESSORS
 from isp.processors.demosaic import menon
 from isp.processors.residual import REACH, residual_interpolation
 from isp.processors.sub_images import Mix, bm3d_mosaic, hadamard, principal_components
+from isp.substitution import PLANE_ERROR
 from sensor.cfa import BAYER, Tile
 from sensor.raw import RawImage
 from studies.metrics.appearance import psnr_db
@@ -41,6 +43,18 @@ def test_non_local_means_are_those_of_the_interleaved_camera() -> None:
     planes = np.asarray(reconstruct(image, neutral=np.array(balance)), dtype=np.float64)
     picture = PROCESSORS["bayer_nlm"].develop(image, np.eye(3), balance=balance)
     assert picture.rgb == pytest.approx(planes / [0.5, 1.0, 0.4], rel=1e-12)
+
+
+def test_its_colours_are_as_uncertain_without_noise_as_those_of_the_interleaved_camera() -> None:
+    """Without noise the matrix is that of the error that is none, decision 0069; the plain camera's counts none."""
+    rng = np.random.default_rng(3)
+    signals, target = rng.uniform(0, 1, (30, 3)), rng.uniform(0, 1, (30, 3))
+    fit = ColourFit(tuple("RGB"), signals.mean(axis=0), signals.T @ signals / 30, signals.T @ target / 30)
+    image = raw_image(np.full((16, 16), 2100), BAYER, read_noise_e=0.0, dsnu_e=0.0, gain_e_per_dn=1e7)
+    for name, error in (("bayer_nlm", PLANE_ERROR), ("bayer", 0.0)):
+        shown = PROCESSORS[name].develop(image, fit, balance=[0.5, 1.0, 0.4]).rgb[8, 8]
+        light = 2000 * 1e7
+        assert shown == pytest.approx(fit.matrix(noise=error) @ [light / 0.5, light, light / 0.4], rel=1e-5), name
 
 
 @pytest.mark.parametrize("cfa", BAYER_PHASES)
