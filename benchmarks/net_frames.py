@@ -1,22 +1,23 @@
 r"""Frames to train the network of `isp.processors.corrected` on: pictures that judge nothing, developed by `ple`.
 
-    python benchmarks/net_frames.py out/net --groups 40          (a group: nine pictures by one camera and lamp)
+    python benchmarks/net_frames.py out/net --groups 40          (a group: ten pictures by one camera and lamp)
     python benchmarks/net_frames.py out/net --photographs out/photographs         (of net_photographs.py)
 
 A frame holds what the network sees, and its target: exact R, G and B of the picture by the camera's own matrix, as
 encoded sRGB over the picture's white. So the network isn't taught colours, which a matrix has to choose.
 
-Pictures are drawn of drawn reflectances (leaves, gratings, and fronts: small patches, and lines in the light of another
-lamp), or are photographs: those that `ple`'s prior was trained on, and those of a folder. A photograph's colours are
-changed at random and become surfaces' spectra; those without colour, and one in four of the others, get two drawn
-surfaces at their ends. Read noise is 0.7 to 6 e-, pitch 0.8 to 3 um, light 0.02 to 1000 cd/m^2, the lens sharp to soft;
-lamps are those of `draw_illuminant`. `HELD` is a photograph left out to validate on, beside those of a folder that
-`is_held` names.
+Pictures are drawn of drawn reflectances (leaves, gratings, charts of grey lines, and fronts: small patches, and lines
+in the light of another lamp), or are photographs: those that `ple`'s prior was trained on, and those of a folder. A
+photograph's colours are changed at random and become surfaces' spectra; those without colour, and one in four of the
+others, get two drawn surfaces at their ends. Read noise is 0.7 to 6 e-, pitch 0.8 to 3 um, light 0.02 to 1000 cd/m^2,
+the lens sharp to soft; lamps are those of `draw_illuminant`. `HELD` is a photograph left out to validate on, beside
+those of a folder that `is_held` names.
 """
 
 import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +53,7 @@ READ_NOISE_E, PITCH_UM, LUMINANCE_CD_M2 = (0.7, 6.0), (0.8, 3.0), (0.02, 1000.0)
 LONGEST_S = 0.066
 LAMPS = ("D65", "D65", "A", "LED-B3")  # half of the groups, the others' are drawn
 # Of a group's pictures in turn; those of a kind that is drawn are parts of one picture.
-KINDS = ("photograph",) * 6 + ("gratings", "leaves", "fronts")
+KINDS = ("photograph",) * 6 + ("gratings", "leaves", "fronts", "charts")
 DRAWN_SURFACES = 0.25  # share of photographs that lend their brightness alone: other spectra than photographs have
 COARSEST = 8  # side of a pixel of a frame in those of a folder's photograph, at most; its least is 2
 HELD_CD_M2 = (0.05, 0.5, 5.0, 100.0)  # of the groups to validate on, in turn
@@ -61,6 +62,7 @@ MOSAICS = {"rgbw": "ple_rgbw", "bayer": "ple_bayer", "RG/WB": "ple_rgbw"}  # wit
 FINE, FRONTS = 3, 220  # points of a pixel's side, and rectangles of a picture
 FRONTS_SIDE = (3.0, 50.0)  # pixels
 LINES_PERIOD = (1.6, 8.0)  # pixels
+NEARLY_GREY = 0.01  # standard deviation of the logarithm of a grey's signals
 LIGHTER = (1.0, 1.0, 1.5)  # factors on the exposure, so that W is full too
 TRUTH_LETTERS = "RGBW"
 
@@ -121,7 +123,30 @@ def fronts(rng: np.random.Generator, light: KnownLight) -> Floats:
     return picture.reshape(2 * CROP, FINE, 2 * CROP, FINE, -1).mean((1, 3))
 
 
-DRAWN = {"leaves": leaf_picture, "gratings": gratings, "fronts": fronts}
+def charts(rng: np.random.Generator, light: KnownLight) -> Floats:
+    """Draw fields of grey lines, (2 CROP, 2 CROP, channel): stars, zone plates, and bars that grow wider."""
+    length, fields = 2 * CROP * FINE, 3
+    picture = np.empty((length, length, len(light.weights)))
+    at = np.linspace(0, length, fields + 1).astype(int)
+    for (top, bottom), (left, right) in product(pairwise(at.tolist()), repeat=2):
+        y, x = np.mgrid[top:bottom, left:right] / FINE
+        middle = rng.uniform((top, left), (bottom, right)) / FINE
+        y, x = y - middle[0], x - middle[1]
+        angle = rng.uniform(0, np.pi)
+        across = np.cos(angle) * y + np.sin(angle) * x
+        phase = (
+            rng.integers(12, 90) * np.arctan2(y, x),
+            (y**2 + x**2) * rng.uniform(0.01, 0.05),
+            2 * np.pi * across / (rng.uniform(*LINES_PERIOD) + 0.02 * np.abs(across)),
+        )[rng.integers(3)]
+        share = (np.sign(np.cos(phase)) if rng.random() < 0.7 else np.cos(phase))[..., None] / 2 + 0.5
+        tint = np.exp(rng.normal(0.0, NEARLY_GREY, len(light.weights)))
+        dark, bright = (value * tint for value in np.sort(rng.uniform(0.03, 0.9, 2)))
+        picture[top:bottom, left:right] = dark + share * (bright - dark)
+    return picture.reshape(2 * CROP, FINE, 2 * CROP, FINE, -1).mean((1, 3))
+
+
+DRAWN = {"leaves": leaf_picture, "gratings": gratings, "fronts": fronts, "charts": charts}
 
 
 def collected(sensor: SensorConfig, lamp: str, nm: Floats) -> Floats:
@@ -234,18 +259,26 @@ def path_of(folder: Path, mosaic: str, index: int, held: bool) -> Path:
     return folder / f"{'held' if held else 'train'}_{mosaic.replace('/', '')}_{index:04}.npz"
 
 
-def draw_group(folder: Path, index: int, held: bool, photographs: Sequence[str | Path], mosaics: Sequence[str]) -> None:
+def draw_group(
+    folder: Path,
+    index: int,
+    held: bool,
+    photographs: Sequence[str | Path],
+    mosaics: Sequence[str],
+    luminance_cd_m2: Sequence[float],
+    kinds: Sequence[str],
+) -> None:
     """Draw a group's frames by one camera and lamp, and write each mosaic's file."""
     rng = np.random.default_rng([64, index, int(held)])
     camera = low_noise() if held else draw_camera(rng)
     lamp = str(rng.choice(LAMPS)) if rng.random() < 0.5 or held else draw_illuminant(rng)
-    middle = rng.uniform(*np.log(LUMINANCE_CD_M2))
-    levels = np.exp(middle + rng.uniform(-np.log(NEAR), np.log(NEAR), len(KINDS)))
+    middle = rng.uniform(*np.log(luminance_cd_m2))
+    levels = np.exp(middle + rng.uniform(-np.log(NEAR), np.log(NEAR), len(kinds)))
     if held:
-        levels = np.full(len(KINDS), HELD_CD_M2[index % len(HELD_CD_M2)])
+        levels = np.full(len(kinds), HELD_CD_M2[index % len(HELD_CD_M2)])
     drawn: dict[str, Floats] = {}
     found = []
-    for kind, level in zip(KINDS, levels, strict=True):
+    for kind, level in zip(kinds, levels, strict=True):
         source = photographs[int(rng.integers(len(photographs)))] if kind == "photograph" else kind
         signals = draw_signals(rng, camera, lamp, source, drawn)
         found.append(take(rng, camera, lamp, Path(source).stem, signals, float(level), mosaics))
@@ -260,10 +293,12 @@ def draw_group(folder: Path, index: int, held: bool, photographs: Sequence[str |
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--groups", type=int, default=100, help="of nine pictures")
+    parser.add_argument("--groups", type=int, default=100, help="of ten pictures")
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--held", type=int, default=0, help="groups to validate on")
     parser.add_argument("--mosaics", nargs="+", choices=MOSAICS, default=["rgbw", "bayer"])
+    parser.add_argument("--kinds", nargs="+", choices=set(KINDS), default=KINDS, help="of a group's pictures in turn")
+    parser.add_argument("--luminance", nargs=2, type=float, default=LUMINANCE_CD_M2, help="least and most [cd/m^2]")
     parser.add_argument("--photographs", type=Path, help="folder of PNG to draw from beside scikit-image's photographs")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
@@ -271,7 +306,8 @@ def main() -> None:
     work += [(index, False) for index in range(given.first, given.first + given.groups)]
     for index, held in work:
         if not all(path_of(given.folder, mosaic, index, held).exists() for mosaic in given.mosaics):
-            draw_group(given.folder, index, held, photographs_of(given.photographs, held), given.mosaics)
+            photographs = photographs_of(given.photographs, held)
+            draw_group(given.folder, index, held, photographs, given.mosaics, given.luminance, given.kinds)
             print(f"group {index}{', held' if held else ''}", flush=True)
 
 
