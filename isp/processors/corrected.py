@@ -32,6 +32,7 @@ from rodcone.types import Image, Singles
 from sensor.cfa import RGBW, Tile, is_rgbw, mask
 from sensor.raw import RawImage, noise_at_sites
 
+WHITE_FOR_GREEN: Tile = ("RG", "WB")  # Bayer's tile with W in place of one of its G
 LEAK = 0.1  # slope of a feature under 0: without it all of the first ones died
 INPUTS = 9  # numbers a pixel that the network sees
 TILES = 8  # pixels: both sides of a frame are brought to a multiple of it
@@ -60,17 +61,17 @@ Weights = Mapping[str, Singles]
 
 
 def picture_corrected_rgbw(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
-    """Develop an RGBW raw image whose tile has R and W on a diagonal, as `picture_ple_rgbw` does, and correct it.
+    """Develop an RGBW raw image whose tile has R and G side by side, as `picture_ple_rgbw` does, and correct it.
 
     Raises
     ------
     InputError
         For another tile.
     """
-    if not is_rgbw(raw.cfa) or not _white_diagonal(raw.cfa):
+    if not is_rgbw(raw.cfa) or _green_diagonal(raw.cfa):
         raise InputError(
-            f"raw: mosaic {raw.cfa} is not R, G, B and W in 2x2 with W diagonal to R; allowed here: {RGBW}, shifted or "
-            "transposed; use ple, which develops any mosaic of R, G, B and W"
+            f"raw: mosaic {raw.cfa} is not R, G, B and W in 2x2 with G beside R; allowed here: {RGBW} and "
+            f"{WHITE_FOR_GREEN}, shifted or transposed; use ple, which develops any mosaic of R, G, B and W"
         )
     return corrected(raw, develop_planes(raw, colours, balance, own_prior()), own_weights())
 
@@ -204,10 +205,10 @@ def _encoding_slope(linear: Image) -> Image:
     return np.where(linear <= 0.0031308, 12.92, 1.055 / 2.4 * np.maximum(linear, 0.0031308) ** (1 / 2.4 - 1))
 
 
-def _white_diagonal(tile: Tile) -> bool:
-    """Whether W lies diagonal to R in a tile of 2x2."""
-    red, white = ("".join(tile).index(name) for name in "RW")
-    return red + white == 3
+def _green_diagonal(tile: Tile) -> bool:
+    """Whether G lies diagonal to R in a tile of 2x2."""
+    red, green = ("".join(tile).index(name) for name in "RG")
+    return red + green == 3
 
 
 def _green_below(tile: Tile) -> bool:

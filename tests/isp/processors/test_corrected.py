@@ -1,5 +1,7 @@
 """A picture corrected by a network: its layers beside plain sums, each phase of a tile, and what is left as it is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from builders import BAYER_PHASES, RGBW_PHASES, raw_image
@@ -10,11 +12,23 @@ from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture
 from isp.processors import corrected
+from isp.processors.catalogue import PROCESSORS
 from isp.processors.piecewise import PiecewisePicture
+from render.radiance import SpectralRadiance
+from render.spectrum import band_widths
 from rodcone.colour_spaces import decode_srgb, encode_srgb, white_of
+from scenes.reflectances import color_checker_reflectances
+from sensor.capture import expose_channels
 from sensor.cfa import channels, mask
+from sensor.device import draw_device
+from sensor.presets import low_noise
+from sensor.response import imaged_electrons
+from studies.metrics.truth import named_light, neutral_electrons
+from studies.photograph.camera import colour_fit
 
 TRANSPOSED = [("RB", "GW"), ("GW", "RB"), ("BR", "WG"), ("WG", "BR")]
+WHITE_FOR_GREEN = [("RG", "WB"), ("GR", "BW"), ("WB", "RG"), ("BW", "GR"), ("RW", "GB"), ("GB", "RW")]
+GREEN_DIAGONAL = [("RW", "BG"), ("RB", "WG"), ("GB", "WR")]
 SHAPES = {
     "first": (7, 36, 3),
     "fine1": (7, 7, 3),
@@ -119,14 +133,16 @@ def test_the_network_sees_every_tile_as_one_that_begins_with_red_and_then_green(
         return 0.1 * packed[..., :12]
 
     monkeypatch.setattr(corrected, "residual", tenth)
-    for tile in [*RGBW_PHASES, *TRANSPOSED, *BAYER_PHASES]:
+    white_below = [0, 0, 1, 0]
+    for tile in [*RGBW_PHASES, *TRANSPOSED, *BAYER_PHASES, *WHITE_FOR_GREEN]:
         raw, made = developed(tile, (21, 30))
         white = white_of(made.picture.rgb)
         change = 0.1 * encode_srgb(made.picture.rgb / white)
         found = corrected.corrected(raw, made, {}).rgb
         assert found == pytest.approx(corrected.added(made.picture.rgb, change, white), rel=1e-5, abs=1e-3), tile
         of_white = seen[-1][..., 32:].mean(axis=(0, 1))
-        assert of_white.tolist() == [0, 0, 0, 1 if "W" in "".join(tile) else 0], tile
+        last = [0, 0, 0, 1 if "W" in "".join(tile) else 0]
+        assert of_white.tolist() == (white_below if tile in WHITE_FOR_GREEN else last), tile
         assert not np.any(np.array(seen[-1].shape[:2]) % 4)
 
 
@@ -168,8 +184,38 @@ def test_pixels_of_a_tile_go_side_by_side_and_back() -> None:
     assert np.array_equal(corrected.unpack(packed), pixels)
 
 
-def test_white_beside_red_is_refused() -> None:
-    raw = raw_image(np.full((16, 16), 500), ("RW", "BG"))
+def test_green_diagonal_to_red_is_refused() -> None:
     fit = ColourFit.of(np.eye(3))
-    for tile in (raw, raw_image(np.full((16, 16), 500), ("RG", "WB"))):
-        refusal(corrected.picture_corrected_rgbw, tile, fit, balance=WhiteBalance(), match="W diagonal to R")
+    for tile in GREEN_DIAGONAL:
+        raw = raw_image(np.full((16, 16), 500), tile)
+        refusal(corrected.picture_corrected_rgbw, raw, fit, balance=WhiteBalance(), match="G beside R")
+
+
+@pytest.mark.parametrize("tile", ["RG/BW", "RG/GB", "RG/WB"])
+def test_the_weights_come_closer_to_exact_planes_than_ple_on_each_tile(tile) -> None:
+    """Rectangles of the ColorChecker's reflectances in D65, photographed at 5 cd/m^2."""
+    rng, light = np.random.default_rng(8), named_light("D65")
+    nm, width = light.wavelength_nm, band_widths(light.wavelength_nm)
+    curves = [curve.band_average(nm, width) for _, curve in color_checker_reflectances()]
+    values = np.empty((96, 96, len(nm)))
+    values[:] = curves[0]
+    for _ in range(200):
+        (top, left), (high, wide) = rng.integers(-5, 96, 2).clip(0), rng.integers(3, 20, 2)
+        values[top : top + high, left : left + wide] = curves[rng.integers(24)] * rng.uniform(0.3, 1.0)
+    radiance = SpectralRadiance(values * light.spectrum, nm)
+    radiance = SpectralRadiance(5.0 * radiance.values / radiance.luminance().mean(), nm)
+    sensor = low_noise(tile)
+    sensor = replace(sensor, lens=replace(sensor.lens, diffraction=0.0))
+    expected_e = imaged_electrons(radiance, sensor, 0.02)
+    raw = expose_channels(expected_e, sensor, 0.02, draw_device(sensor, (96, 96), rng), rng, exact=True)
+    neutral = neutral_electrons(sensor, light, 0.02)
+    names = ("ple_bayer", "ple_bayer_net") if tile == "RG/GB" else ("ple_rgbw", "ple_rgbw_net")
+    fit = colour_fit(sensor, PROCESSORS[names[0]], light)
+    exact = (expected_e / neutral)[..., [sensor.channels.index(name) for name in "RGB"]] @ fit.matrix().T
+    scale = neutral[sensor.channels.index("G")]
+    found = [PROCESSORS[name].develop(raw, fit, balance=WhiteBalance.of(raw, neutral, neutral)) for name in names]
+    white = exact.max()
+    errors = [
+        np.mean((encode_srgb(picture.rgb / scale / white) - encode_srgb(exact / white)) ** 2) for picture in found
+    ]
+    assert 10 * np.log10(errors[0] / errors[1]) > 0.5
