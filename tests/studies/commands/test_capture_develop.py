@@ -356,7 +356,8 @@ def negative(path: Path, cfa: str = "bayer", share: float = 0.25, light: str = "
     return raw
 
 
-PAPERS_PAIR = {"bayer": "bayer", "rgbw": "interleaved"}  # which give an even mosaic back to rounding
+# These give an even mosaic back to rounding, in the colours of the plain matrix.
+PAPERS_PAIR = {"bayer": "bayer", "rgbw": "interleaved_paper"}
 
 
 @pytest.mark.parametrize(("cfa", "share"), [("bayer", 0.25), ("rgbw", 0.18)])
@@ -391,8 +392,12 @@ def test_as_shot_balance_keeps_the_light_s_colour_that_gray_world_takes_away(cfa
     signal = np.array([raw.electrons[mask(raw.cfa, channel, SHAPE)].mean() for channel in "RGB"])
     orange = colour.to_srgb @ (signal / colour.neutral[:3] / raw.full_well_e)
     grey = np.full(3, 0.1)
+    for own in {"bayer": ("bayer",), "rgbw": ("interleaved", "ple")}[cfa]:
+        printed = call(["develop", str(tmp_path / "shot.dng"), "--isp", own, "-o", str(tmp_path / "o.png"), "--json"])[
+            1
+        ]
+        assert set(json.loads(printed)["balance"].values()) == {"given"}, "without a word, as shot"
     for balance, source, expected in (
-        ([], "given", orange),
         (["--white-balance", "as-shot"], "given", orange),
         (["--white-balance", "gray-world"], "gray world", grey),
         (["--white-balance", "A"], "given", grey),
