@@ -24,6 +24,7 @@ from zipfile import ZipFile
 
 import numpy as np
 from headline import read_split
+from net_frames import MOSAICS
 from numpy.typing import NDArray
 from PIL import Image
 from training_pictures import FINER, LIGHTS, leaves, training_pictures
@@ -56,7 +57,6 @@ from sensor.response import imaged_electrons
 from studies.metrics.truth import Light, light_in_bands, neutral_electrons, true_srgb
 from studies.photograph.camera import colour_fit
 
-MOSAICS = {"rgbw": "ple_rgbw", "bayer": "ple_bayer", "RG/WB": "ple_rgbw"}  # with the processor that chooses the matrix
 LEVELS_CD_M2, LONGEST_S = (0.05, 0.5, 5.0, 100.0), 0.066
 DRAWN, DRAWN_SEED = 12, 20261129  # two of each kind under D65, A and LED-B3, a seed that nothing is chosen by
 EXACT = "exact"

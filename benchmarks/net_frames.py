@@ -96,8 +96,10 @@ def draw_camera(rng: np.random.Generator) -> SensorConfig:
 def draw_front(rng: np.random.Generator, light: KnownLight, side: tuple[int, int]) -> Floats:
     """Draw a rectangle (h, w, channel) of a surface, vivid or not, in this lamp's light or another's, often lined."""
     low, high = rng.uniform(0.02, 0.1), rng.uniform(0.3, 0.8)
-    vivid = (edge(rng.uniform(470, 640), rng.uniform(8, 30), *rng.permutation([low, high])), band(
-        rng.uniform(420, 640), rng.uniform(20, 60), *rng.permutation([low, high])))  # fmt: skip
+    vivid = (
+        edge(rng.uniform(470, 640), rng.uniform(8, 30), *rng.permutation([low, high])),
+        band(rng.uniform(420, 640), rng.uniform(20, 60), *rng.permutation([low, high])),
+    )
     width = band_widths(NM)
     surface = vivid[rng.integers(2)].band_average(NM, width) if rng.random() < 0.4 else draw_surface(rng)
     other = np.exp(np.interp(NM, np.linspace(380, 780, 6), rng.normal(0.0, 0.5, 6)))
@@ -120,7 +122,7 @@ def fronts(rng: np.random.Generator, light: KnownLight) -> Floats:
         place = picture[top : top + int(side[0] * FINE), left : left + int(side[1] * FINE)]
         painted = draw_front(rng, light, (int(np.ceil(side[0])), int(np.ceil(side[1]))))
         place[:] = painted[: place.shape[0], : place.shape[1]]
-    return picture.reshape(2 * CROP, FINE, 2 * CROP, FINE, -1).mean((1, 3))
+    return mean_of_squares(picture, FINE)
 
 
 def charts(rng: np.random.Generator, light: KnownLight) -> Floats:
@@ -143,7 +145,7 @@ def charts(rng: np.random.Generator, light: KnownLight) -> Floats:
         tint = np.exp(rng.normal(0.0, NEARLY_GREY, len(light.weights)))
         dark, bright = (value * tint for value in np.sort(rng.uniform(0.03, 0.9, 2)))
         picture[top:bottom, left:right] = dark + share * (bright - dark)
-    return picture.reshape(2 * CROP, FINE, 2 * CROP, FINE, -1).mean((1, 3))
+    return mean_of_squares(picture, FINE)
 
 
 DRAWN = {"leaves": leaf_picture, "gratings": gratings, "fronts": fronts, "charts": charts}
