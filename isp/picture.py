@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.encoding import encode
 from isp.colour.highlights import clip_highlights
+from isp.colour.light_around import LIGHTS, apply_by_light, light_around
 from isp.colour.white_balance import BalanceSource, WhiteBalance
 from isp.substitution import COLOUR_ERROR, PLANE_ERROR
 from rodcone.colour_spaces import white_of
@@ -131,11 +132,13 @@ def finish(
         )
     colours = ColourFit.of(matrix)
     gains, sources = WhiteBalance.of(raw, neutral, balance).gains(raw, planes)
-    error = np.zeros(3)
-    if noise_gain is not None:
-        error = COLOUR_ERROR * relative_noise(raw, planes, noise_gain, gains, colours) + PLANE_ERROR
     balanced = clip_highlights(raw, planes * gains, gains)
-    return Picture(balanced @ colours.matrix(noise=error).T, sources, engine)
+    if noise_gain is None:
+        return Picture(balanced @ colours.matrix().T, sources, engine)
+    errors = COLOUR_ERROR * relative_noise(raw, planes, noise_gain, gains, colours, LIGHTS) + PLANE_ERROR
+    matrices = np.array([colours.matrix(noise=error) for error in errors])
+    light = light_around(raw, balanced[..., raw.channels.index(raw.unit_channel)])
+    return Picture(apply_by_light(balanced, light, matrices), sources, engine)
 
 
 def require_letters(raw: RawImage, names: tuple[str, ...]) -> tuple[str, ...]:

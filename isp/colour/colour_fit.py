@@ -251,13 +251,19 @@ def _band_last(name: str, values: ArrayLike, bands: int) -> Floats:
 
 
 def relative_noise(
-    raw: RawImage, estimate: NDArray[np.floating], noise_gain: NDArray[np.floating], gains: Floats, fit: ColourFit
+    raw: RawImage,
+    estimate: NDArray[np.floating],
+    noise_gain: NDArray[np.floating],
+    gains: Floats,
+    fit: ColourFit,
+    light: ArrayLike = 1.0,
 ) -> Floats:
     """Estimate the noise variance of a frame's balanced channels, for `ColourFit.matrix`.
 
-    Each channel has one number per frame, because a matrix per pixel would flicker. It is the variance at the frame's
-    mean, relative to the squared signal of a surface that reflects all light. That signal is estimated from the frame's
-    mean green (or `sensor.cfa.unit_channel`), on the assumption that the scene is as bright as the training surfaces.
+    Each channel has one number per frame and light. It is the variance at the frame's mean times `light`, relative to
+    the squared signal of a surface that reflects all light. That signal is estimated from the same multiple of the
+    frame's mean green (or `sensor.cfa.unit_channel`), on the assumption that what is there is as bright as the training
+    surfaces.
 
     Parameters
     ----------
@@ -266,10 +272,12 @@ def relative_noise(
         (channel,) holds for every pixel.
     gains : (channel,) float64
         White balance.
+    light : float or (n,) array_like
+        Light over the frame's mean.
 
     Returns
     -------
-    (channel,) float64
+    (channel,) or (n, channel) float64
         Variances [(signal of a surface that reflects all light)^2].
     """
     unit = raw.unit_channel
@@ -282,7 +290,8 @@ def relative_noise(
     if noise_gain.ndim > 1:
         noise_gains = np.ascontiguousarray(rows_at(noise_gain, kept)[::MEDIAN_STEP].T)
         medians = np.median(noise_gains, axis=1, overwrite_input=True)
-    variance = channel_variance(raw, mean) * medians * gains**2
-    white = mean[green] * gains[green] / fit.mean[fit.channels.index(unit)]
+    times = np.asarray(light, dtype=np.float64)[..., None]
+    variance = channel_variance(raw, mean * times) * medians * gains**2
+    white = mean[green] * gains[green] / fit.mean[fit.channels.index(unit)] * times
     # A frame without any signal is only noise. The matrix then depends on W alone, whatever the divisor is.
-    return np.asarray(variance / max(white**2, LEAST_SIGNAL**2 * float(variance.max())))
+    return np.asarray(variance / np.maximum(white**2, LEAST_SIGNAL**2 * variance.max(axis=-1, keepdims=True)))

@@ -1,7 +1,10 @@
 """Pipelines from a raw image to linear sRGB for the paper's two cameras: interleaved RGBW and conventional Bayer."""
 
+import numpy as np
+
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.highlights import clip_highlights
+from isp.colour.light_around import LIGHTS, apply_by_light, light_around
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved.edges import sharpen
 from isp.interleaved.reconstruction import reconstruct_with_noise
@@ -55,13 +58,14 @@ def picture_interleaved(
     if result.white is None:
         raise InputError("settings.distance: 'raw' isn't allowed; give 'noise', or take picture_interleaved_paper")
     gains, sources = balance.gains(raw, result.estimate)
-    noise = relative_noise(raw, result.estimate, result.noise_gain, gains, colours)
+    noise = relative_noise(raw, result.estimate, result.noise_gain, gains, colours, LIGHTS)
     snr = green_snr(raw, result.estimate)
     weight = substitution_weight(snr, substitution_snr)
     planes = follow_samples(result.white, result.estimate, result.noise_gain)
     planes = sharpen(result.white, planes, gains, result.noise_gain)
     balanced = clip_highlights(raw, planes * gains, gains)
-    rgb = balanced @ matrix_with_white(colours, noise, weight).T
+    matrices = np.array([matrix_with_white(colours, at_light, weight) for at_light in noise])
+    rgb = apply_by_light(balanced, light_around(raw, balanced[..., raw.channels.index("W")]), matrices)
     return Picture(rgb, sources, engine=result.engine, snr=snr, substitution=weight)
 
 
