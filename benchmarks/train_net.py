@@ -40,6 +40,7 @@ ONE_PIXEL = [0, 1, 2, 4, 7]  # of `correction_inputs`: the picture, the noise, t
 HALF = bool(torch.cpu.get_capabilities().get("avx512_bf16", False))
 CARD = "card"
 MOSAICS = {"rgbw": 3, "bayer": 3, "RGWB": 2}  # with the crops of a step
+TRANSPOSED = ("bayer",)  # whose tile, transposed, is the same
 NAMES = ("network", "control")
 
 
@@ -130,8 +131,12 @@ def read_frames(folder: Path, part: str, mosaic: str) -> Frames:
     return Frames(np.concatenate(seen), np.concatenate(targets), tuple(names))
 
 
-def crop(rng: np.random.Generator, seen: NDArray[Any], target: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Cut a crop, reversed at random so that its tile is the same, as planes of packed inputs and target."""
+def crop(
+    rng: np.random.Generator, mosaic: str, seen: NDArray[Any], target: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Cut a crop, reversed (and transposed) at random so that its tile is the same, as planes of inputs and target."""
+    if mosaic in TRANSPOSED and rng.integers(2):
+        seen, target = seen.swapaxes(0, 1), target.swapaxes(0, 1)
     for _ in range(2):
         reverse = int(rng.integers(2))
         start = 2 * int(rng.integers((len(seen) - SIDE - reverse) // 2 + 1)) + reverse
@@ -203,7 +208,7 @@ class Run:
         crops = []
         for mosaic, one in frames.items():
             chosen = self.rng.integers(len(one.seen), size=MOSAICS[mosaic])
-            crops += [crop(self.rng, one.seen[index], one.targets[index]) for index in chosen]
+            crops += [crop(self.rng, mosaic, one.seen[index], one.targets[index]) for index in chosen]
         packed, target = (torch.from_numpy(np.stack([one[part] for one in crops])) for part in (0, 1))
         before = packed[:, :12]
         # Half precision where the processor multiplies in it: a step takes 0.4 of its time.

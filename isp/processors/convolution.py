@@ -8,7 +8,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from rodcone.types import Singles
 
-_BLOCK = 1 << 20  # largest number of floats in a product's left matrix: 4 MB, which stay in the processor's cache
+_BLOCK = 1 << 18  # largest number of floats in a product's left matrix: 1 MB, which stays in the processor's cache
 
 
 def convolve(

@@ -11,6 +11,7 @@ changes what the mosaic and the noise hid, and leaves the choice of colours to t
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from itertools import product
 from os import cpu_count
 from pathlib import Path
 from types import MappingProxyType
@@ -41,6 +42,8 @@ MISFIT_UNIT = 3.0  # standard deviations that are a misfit of 1
 LEAST_NOISE_E = 1e-3
 OWN = Path(__file__).with_name("corrected.npz")  # weights for both mosaics, in half precision
 CARD = "card"  # name of the text in that file
+# Of a frame with a row and a column beyond its tiles at one end: as it is, and reversed, both beginning with R.
+REVERSALS = (slice(1, None), slice(-2, None, -1))
 STRIP_ROWS = 512  # rows that are corrected together, so that features of a whole frame never fill the memory
 REACH = 64  # rows beyond a strip on which its pixels depend: 56, and what halves of tiles round up
 # Names of the layers, with what each takes from the one before: a step of 2 goes to half the size.
@@ -96,7 +99,11 @@ def card() -> str:
 
 
 def corrected(raw: RawImage, developed: PiecewisePicture, weights: Weights) -> Picture:
-    """Add the network's residual to a picture; as it is where nothing is lit."""
+    """Add the network's residual to a picture; as it is where nothing is lit.
+
+    The residual is the mean of four, of the frame as it is and reversed along each side and both. What the network gets
+    wrong in one of them, such as its own pattern of the tile, is in part another thing in the others.
+    """
     picture = developed.picture
     white = white_of(picture.rgb)
     if white <= 0:
@@ -108,16 +115,25 @@ def corrected(raw: RawImage, developed: PiecewisePicture, weights: Weights) -> P
     if transposed:
         seen, phase = seen.swapaxes(0, 1), phase[::-1]
     shape = seen.shape[:2]
-    sides = [(offset, -(length + offset) % TILES) for length, offset in zip(shape, phase, strict=True)]
-    wide = np.pad(seen, [*sides, (0, 0)], mode="reflect")  # reflection keeps the mosaic
-    change = np.empty((*wide.shape[:2], 3), np.float32)
-    for rows in strips(len(wide), STRIP_ROWS):
-        top = max(rows.start - REACH, 0)
-        found = unpack(residual(pack(wide[top : rows.stop + REACH]), weights))
-        change[rows] = found[rows.start - top :][: rows.stop - rows.start]
-    change = change[phase[0] :, phase[1] :][: shape[0], : shape[1]]
+    # Reflection keeps the mosaic. A row and a column more at each end let a reversed frame begin with R too.
+    sides = [(offset + 1, TILES - (length + offset) % TILES) for length, offset in zip(shape, phase, strict=True)]
+    wide = np.pad(seen, [*sides, (0, 0)], mode="reflect")
+    change = np.zeros((*wide.shape[:2], 3), np.float32)
+    for place in product(REVERSALS, repeat=2):
+        change[place] += _residual_of_strips(wide[place], weights) / len(REVERSALS) ** 2
+    change = change[phase[0] + 1 :, phase[1] + 1 :][: shape[0], : shape[1]]
     change = change.swapaxes(0, 1) if transposed else change
     return Picture(added(picture.rgb, change.astype(np.float64), white), picture.balance)
+
+
+def _residual_of_strips(seen: Singles, weights: Weights) -> Singles:
+    """Return the residual (h, w, 3) for what is seen (h, w, INPUTS), strip by strip."""
+    found = np.empty((*seen.shape[:2], 3), np.float32)
+    for rows in strips(len(seen), STRIP_ROWS):
+        top = max(rows.start - REACH, 0)
+        part = unpack(residual(pack(seen[top : rows.stop + REACH]), weights))
+        found[rows] = part[rows.start - top :][: rows.stop - rows.start]
+    return found
 
 
 def correction_inputs(raw: RawImage, developed: PiecewisePicture, white: float) -> Singles:
