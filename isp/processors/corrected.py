@@ -11,7 +11,6 @@ changes what the mosaic and the noise hid, and leaves the choice of colours to t
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from itertools import product
 from os import cpu_count
 from pathlib import Path
 from types import MappingProxyType
@@ -42,7 +41,7 @@ MISFIT_UNIT = 3.0  # standard deviations that are a misfit of 1
 LEAST_NOISE_E = 1e-3
 OWN = Path(__file__).with_name("corrected.npz")  # weights for both mosaics, in half precision
 CARD = "card"  # name of the text in that file
-# Of a frame with a row and a column beyond its tiles at one end: as it is, and reversed, both beginning with R.
+# Of a frame with a row and a column beyond its tiles at either end: as it is, and reversed, both beginning with R.
 REVERSALS = (slice(1, None), slice(-2, None, -1))
 STRIP_ROWS = 512  # rows that are corrected together, so that features of a whole frame never fill the memory
 REACH = 64  # rows beyond a strip on which its pixels depend: 56, and what halves of tiles round up
@@ -101,8 +100,8 @@ def card() -> str:
 def corrected(raw: RawImage, developed: PiecewisePicture, weights: Weights) -> Picture:
     """Add the network's residual to a picture; as it is where nothing is lit.
 
-    The residual is the mean of four, of the frame as it is and reversed along each side and both. What the network gets
-    wrong in one of them, such as its own pattern of the tile, is in part another thing in the others.
+    The residual is the mean of two, of the frame as it is and turned by half a turn. What the network gets wrong in one
+    of them, such as its own pattern of the tile, is in part another thing in the other.
     """
     picture = developed.picture
     white = white_of(picture.rgb)
@@ -115,12 +114,12 @@ def corrected(raw: RawImage, developed: PiecewisePicture, weights: Weights) -> P
     if transposed:
         seen, phase = seen.swapaxes(0, 1), phase[::-1]
     shape = seen.shape[:2]
-    # Reflection keeps the mosaic. A row and a column more at each end let a reversed frame begin with R too.
+    # Reflection keeps the mosaic. A row and a column more at each end let the turned frame begin with R too.
     sides = [(offset + 1, TILES - (length + offset) % TILES) for length, offset in zip(shape, phase, strict=True)]
     wide = np.pad(seen, [*sides, (0, 0)], mode="reflect")
     change = np.zeros((*wide.shape[:2], 3), np.float32)
-    for place in product(REVERSALS, repeat=2):
-        change[place] += _residual_of_strips(wide[place], weights) / len(REVERSALS) ** 2
+    for way in REVERSALS:
+        change[way, way] += _residual_of_strips(wide[way, way], weights) / len(REVERSALS)
     change = change[phase[0] + 1 :, phase[1] + 1 :][: shape[0], : shape[1]]
     change = change.swapaxes(0, 1) if transposed else change
     return Picture(added(picture.rgb, change.astype(np.float64), white), picture.balance)
