@@ -7,7 +7,8 @@ r"""Train the network of `isp.processors.corrected` on its mosaics at once (need
 
 Three of each batch's eight crops are RGBW, three Bayer, and two have another tile of R, G, B and W. It resumes where it
 was stopped; ``--steps`` may change then. Each line of the log is JSON: steps, processor seconds, and the gain over
-`ple` [dB of encoded sRGB against the frames' targets], of the last crops and of held frames by mosaic.
+`ple` [dB of encoded sRGB against the frames' targets], of the last crops and of held frames by mosaic, by one pass
+(`isp.processors.corrected` takes the mean of two).
 """
 
 import argparse
@@ -40,7 +41,7 @@ ONE_PIXEL = [0, 1, 2, 4, 7]  # of `correction_inputs`: the picture, the noise, t
 HALF = bool(torch.cpu.get_capabilities().get("avx512_bf16", False))
 CARD = "card"
 MOSAICS = {"rgbw": 3, "bayer": 3, "RGWB": 2}  # with the crops of a step
-TRANSPOSED = ("bayer",)  # whose tile, transposed, is the same
+SYMMETRIC = ("bayer",)  # mosaics whose tile equals its transpose
 NAMES = ("network", "control")
 
 
@@ -134,8 +135,8 @@ def read_frames(folder: Path, part: str, mosaic: str) -> Frames:
 def crop(
     rng: np.random.Generator, mosaic: str, seen: NDArray[Any], target: NDArray[Any]
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Cut a crop, reversed (and transposed) at random so that its tile is the same, as planes of inputs and target."""
-    if mosaic in TRANSPOSED and rng.integers(2):
+    """Cut a crop, reverse it at random (transpose Bayer's too), so that its tile stays; planes of inputs and target."""
+    if mosaic in SYMMETRIC and rng.integers(2):
         seen, target = seen.swapaxes(0, 1), target.swapaxes(0, 1)
     for _ in range(2):
         reverse = int(rng.integers(2))

@@ -123,7 +123,8 @@ def finish(
         Engine that made the planes.
     noise_gain : (h, w, 3) array, optional
         Noise gain as `isp.interleaved.reconstruction.reconstruct_with_noise` returns it. If `matrix` is a `ColourFit`,
-        the colours take this noise into account, and `isp.substitution.PLANE_ERROR` beside it.
+        the colours take this noise into account, at the light around each pixel (`isp.colour.light_around`), and
+        `isp.substitution.PLANE_ERROR` beside it.
     """
     shape = *raw.shape, len(raw.channels)
     if planes.shape != shape or (noise_gain is not None and np.shape(noise_gain) != shape):

@@ -262,8 +262,8 @@ def relative_noise(
 
     Each channel has one number per frame and light. It is the variance at the frame's mean times `light`, relative to
     the squared signal of a surface that reflects all light. That signal is estimated from the same multiple of the
-    frame's mean green (or `sensor.cfa.unit_channel`), on the assumption that what is there is as bright as the training
-    surfaces.
+    frame's mean green (or `sensor.cfa.unit_channel`), on the assumption that the surfaces there reflect as much as the
+    training surfaces on average.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ def relative_noise(
     gains : (channel,) float64
         White balance.
     light : float or (n,) array_like
-        Light over the frame's mean.
+        Light for which the noise is estimated, over the frame's mean.
 
     Returns
     -------

@@ -70,9 +70,9 @@ def mean_snr(raw: RawImage, unit: str) -> tuple[float, float]:
 def colours_in_noise(raw: RawImage, fit: ColourFit, balance: WhiteBalance, unit: str, gains: NoiseGains) -> ColourFit:
     """Add the error of a processor's planes to the noise for which a fit's matrix is computed.
 
-    A fit with a plain matrix is returned unchanged. Each channel has one number per frame, because a matrix per pixel
-    would flicker. The error is that of a grey scene whose mean in `unit` is the frame's. It is relative to the signal
-    of a surface that reflects all light, as in `isp.colour.colour_fit.relative_noise`.
+    A fit with a plain matrix is returned unchanged. Each channel has one number per frame. The error is that of a grey
+    scene whose mean in `unit` is the frame's. It is relative to the signal of a surface that reflects all light, as in
+    `isp.colour.colour_fit.relative_noise`.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ def picture_interleaved(
     settings: Settings = DEFAULTS,
     substitution_snr: float = SUBSTITUTION_SNR,
 ) -> Picture:
-    """Develop an interleaved RGBW raw image: eqs. (1)-(5), Gray World, matrix, substitution.
+    """Develop an interleaved RGBW raw image: eqs. (1)-(5), Gray World, a matrix by light, substitution.
 
     Parameters
     ----------

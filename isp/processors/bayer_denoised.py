@@ -33,8 +33,8 @@ OPPONENT = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6
 def picture_bayer_nlm(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
     """Develop a Bayer raw image with `isp.interleaved.reconstruction.reconstruct`.
 
-    Every sample, converted to green, guides the similarity. The colour matrix is noise-aware, as in the interleaved
-    camera.
+    Every sample, converted to green, guides the similarity. The colour matrix follows the noise at the light
+    around each pixel, as in the interleaved camera.
     """
     require_bayer(raw.cfa)
     result = reconstruct_with_noise(raw, neutral=balance.expected(raw))

@@ -35,13 +35,14 @@ from sensor.raw import RawImage, noise_at_sites
 WHITE_FOR_GREEN: Tile = ("RG", "WB")  # Bayer's tile with W in place of one of its G
 LEAK = 0.1  # slope of a feature under 0: without it all of the first ones died
 INPUTS = 9  # numbers a pixel that the network sees
-TILES = 8  # pixels: both sides of a frame are brought to a multiple of it
+TILES = 8  # pixels: the network takes frames whose sides are a multiple of it
 MOST_MISFIT = 5.0  # standard deviations by which a sample may lie beside the picture
 MISFIT_UNIT = 3.0  # standard deviations that are a misfit of 1
 LEAST_NOISE_E = 1e-3
 OWN = Path(__file__).with_name("corrected.npz")  # weights for both mosaics, in half precision
 CARD = "card"  # name of the text in that file
-# Of a frame with a row and a column beyond its tiles at either end: as it is, and reversed, both beginning with R.
+# Two views of a frame that has one row and one column more than whole tiles: as it is, without the first, and turned,
+# without the last. Both begin with R.
 REVERSALS = (slice(1, None), slice(-2, None, -1))
 STRIP_ROWS = 512  # rows that are corrected together, so that features of a whole frame never fill the memory
 REACH = 64  # rows beyond a strip on which its pixels depend: 56, and what halves of tiles round up
@@ -100,8 +101,8 @@ def card() -> str:
 def corrected(raw: RawImage, developed: PiecewisePicture, weights: Weights) -> Picture:
     """Add the network's residual to a picture; as it is where nothing is lit.
 
-    The residual is the mean of two, of the frame as it is and turned by half a turn. What the network gets wrong in one
-    of them, such as its own pattern of the tile, is in part another thing in the other.
+    The residual is the mean of two: that of the frame as it is, and that of the frame turned by half a turn. The
+    network's errors, such as a pattern of the tile, differ in part between them, so that the mean has less of them.
     """
     picture = developed.picture
     white = white_of(picture.rgb)
@@ -114,7 +115,7 @@ def corrected(raw: RawImage, developed: PiecewisePicture, weights: Weights) -> P
     if transposed:
         seen, phase = seen.swapaxes(0, 1), phase[::-1]
     shape = seen.shape[:2]
-    # Reflection keeps the mosaic. A row and a column more at each end let the turned frame begin with R too.
+    # Reflection keeps the mosaic. One row and column more than whole tiles let the turned frame begin with R too.
     sides = [(offset + 1, TILES - (length + offset) % TILES) for length, offset in zip(shape, phase, strict=True)]
     wide = np.pad(seen, [*sides, (0, 0)], mode="reflect")
     change = np.zeros((*wide.shape[:2], 3), np.float32)

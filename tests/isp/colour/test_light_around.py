@@ -28,7 +28,7 @@ def fit() -> ColourFit:
 
 
 def test_each_pixel_has_the_matrix_of_its_light() -> None:
-    """At the mean, at the most, and where half of the way in noise is gone: at 1 / (1 - 3 / 8) of the mean."""
+    """At the mean, at four times the mean, and at 1.6 times the mean, where 1/s is halfway between."""
     rng = np.random.default_rng(1)
     matrices = rng.normal(size=(2, 3, 4))
     pixels = rng.normal(size=(5, 3, 4))

@@ -118,7 +118,7 @@ def test_strips_of_a_frame_are_what_the_whole_gives(monkeypatch) -> None:
 
 
 def test_the_picture_of_a_turned_frame_is_the_turned_picture() -> None:
-    """Within, because zeros lie beyond the frame at other distances; one pass of this network knows up from down."""
+    """Only the middle is compared, because zeros lie beyond the frame at other distances. One pass isn't symmetric."""
     weights, size = random_network(), 142  # so that the coarsest pixels, of 8 x 8, are the same from either end
     raw, made = developed(BAYER_PHASES[0], (size, size))
     picture = corrected.corrected(raw, made, weights).rgb
